@@ -213,6 +213,17 @@ class ItemChanged(Event):
 
 
 @dataclass(frozen=True)
+class BinsEmptied(Event):
+    """A person, a skill or a program declared that bins have been emptied.
+
+    Attributes:
+        bins: Names of the bins.
+    """
+
+    bins: Sequence[str]
+
+
+@dataclass(frozen=True)
 class TargetSelected(Event):
     """A skill selected the next item to pick.
 

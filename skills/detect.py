@@ -29,8 +29,8 @@ class Detect(LookingSkill):
     If all detections on the table are doubtful, the skill fails with `unsure`, or, with `doubtful: pass`,
     succeeds with an empty output. If the arm hides part of the workspace, the skill fails with `hidden`, or,
     with `hidden: pass`, detects objects in the visible part; the hidden part then counts as unknown.
-    The skill fails with `crowded` if the detector reports more than 60 boxes of any confidence, and with
-    `camera_moved` if the bins in the image are away from their expected positions.
+    The skill fails with `crowded` if the detector reports more than 60 boxes of any confidence outside of the
+    bins, and with `camera_moved` if the bins in the image are away from their expected positions.
     """
 
     detections: Out[Detections] = port(doc="the detections and their frame")

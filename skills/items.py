@@ -57,6 +57,20 @@ class Defer(Skill):
         cell.ledger.defer(self.item)
 
 
+class EmptyBin(Skill):
+    """Declare that a person or a conveyor has emptied a bin.
+
+    The items stay placed, but no longer count as objects in the bin: its quotas and slots start again. In a
+    simulated or fake cell, the objects disappear. The arm does not move.
+    """
+
+    bin: In[str] = port(refers_to="bin", doc="the emptied bin")
+
+    def run(self, cell: Cell) -> None:
+        """Declare the bin as emptied."""
+        cell.empty_bins([self.bin])
+
+
 class RejectTarget(Skill):
     """Reject an item: the robot leaves the item at its position, and the report lists it.
 

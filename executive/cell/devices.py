@@ -420,8 +420,11 @@ class TrueWorld(Protocol):
     def find_held_object(self) -> TrueObject | None:
         """Return the object in the tool, or None."""
 
-    def remove_object(self, true_object: TrueObject) -> None:
-        """Remove an object that is not held from the world."""
+    def remove_object(self, true_object: TrueObject, *, is_counted: bool = True) -> None:
+        """Remove an object that is not held from the world.
+
+        If `is_counted` is False, `list_final_objects` does not return the object.
+        """
 
     def move_object(self, true_object: TrueObject, displacement: tuple[float, float]) -> None:
         """Displace an object that is not held by `(x, y)` [m]."""

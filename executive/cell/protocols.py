@@ -187,6 +187,9 @@ class Ledger(Protocol):
     def record_placement(self, item: Item, bin: str) -> None:
         """Record that an item was released in a bin."""
 
+    def empty_bins(self, bins: Collection[str]) -> None:
+        """Record that bins have been emptied: their items stay placed, but are no longer in a bin."""
+
     def record_put_down(self, item: Item, position: Array) -> None:
         """Record that an item was put back on the table, with its centre at `position` `(3,)` [m]."""
 
@@ -392,6 +395,7 @@ class Cell:
         tool_model: Grasps, measurements and limits of the tool.
         motion: Heights and speed of guarded motions.
         report_selection: Function that reports a selected target and the name of its bin to the run.
+        empty_bins: Function that declares that the bins with the given names have been emptied.
         quotas: Maximum numbers of objects in the bins, from the mission.
         behaviours: Behaviours of other projects.
     """
@@ -411,5 +415,6 @@ class Cell:
     tool_model: ToolModel
     motion: MotionConfig
     report_selection: Callable[[Target, str], None]
+    empty_bins: Callable[[Sequence[str]], None]
     quotas: Quotas
     behaviours: Behaviours = field(default_factory=Behaviours)

@@ -130,7 +130,7 @@ def run_command(
         if (note := "; ".join(problems)) and (views or result.diagnosis is not None):
             click.echo(f"note: {note}", err=True)
         if terminal_view is not None:
-            items = terminal_view.changes.values()
+            items = terminal_view.timeline.items.changes.values()
             click.echo(terminal.format_summary(result, items, repeat_command, report), err=True, nl=False)
         elif result.diagnosis is not None:
             lines = format_diagnosis(result.diagnosis, result.run, repeat_command, report)

@@ -341,8 +341,8 @@ class FakeDriver:
     def find_held_object(self) -> TrueObject | None:
         return self.world.held_object
 
-    def remove_object(self, true_object: TrueObject) -> None:
-        self.world.remove(true_object)
+    def remove_object(self, true_object: TrueObject, *, is_counted: bool = True) -> None:
+        self.world.remove(true_object, is_counted=is_counted)
 
     def move_object(self, true_object: TrueObject, displacement: tuple[float, float]) -> None:
         true_object.position[:2] += displacement

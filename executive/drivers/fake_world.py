@@ -42,15 +42,17 @@ class FakeWorld:
     def put(self, label: str, x: float, y: float) -> TrueObject:
         """Put a new object of a class on the table, with its centre at `x` and `y` [m], and return it."""
         position = np.array([x, y, self.classes[label].height / 2])
-        body = len(self.objects) + len(self.removed_objects)
+        body = 1 + max((each.body for each in (*self.objects, *self.removed_objects)), default=-1)
         fake_object = TrueObject(label, Pose.of(position), body, [position.copy()])
         self.objects.append(fake_object)
         return fake_object
 
-    def remove(self, fake_object: TrueObject) -> None:
-        """Remove an object that is not held."""
-        self.objects.remove(fake_object)
-        self.removed_objects.append(fake_object)
+    def remove(self, true_object: TrueObject, *, is_counted: bool = True) -> None:
+        """Remove the object with the body of `true_object`, which is not held; unless counted, forget it."""
+        removed = next(each for each in self.objects if each.body == true_object.body)
+        self.objects.remove(removed)
+        if is_counted:
+            self.removed_objects.append(removed)
 
     def release(self, *, is_dropped: bool = False) -> None:
         """Let the held object fall straight down; if it is dropped, it rolls to a free position."""

@@ -93,6 +93,8 @@ SET_POSE = "pose"
 """Kind of a new pose of an object; the arguments are its body, its position [m] and its quaternion."""
 REMOVE = "remove"
 """Kind of the removal of an object; the argument is its body."""
+FORGET = "forget"
+"""Kind of the removal of an object that the end of the run does not count; the argument is its body."""
 
 
 class Command(NamedTuple):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,8 @@ from executive.ledger.belief import make_viewpoint_key
 from executive.ledger.item import ItemRecord, ItemRecords, State
 from executive.ledger.look import MAX_STANDARD_DEVIATIONS
 
+REASON_PROBABLY_FELL = "it probably fell into the bin"
+"""Reason of the state PLACED of a dropped item that no look has shown in the bin."""
 WALL_MARGIN = 0.035
 """Minimum distance from the walls at which an object that lands in a bin certainly stays there [m]."""
 LOG_ODDS_FELL_IN_BIN = math.log(0.95 / 0.05)
@@ -57,6 +59,17 @@ class BinContents:
         items = [item for item in self.records.all if bin_name in (item.bin, find_probable_bin(item))]
         return len(items) if label is None else sum(item.label == label for item in items)
 
+    def archive_items(self, bins: Collection[str]) -> None:
+        """Archive the items in bins that were emptied, and all phantoms that cannot become an item again."""
+        for record in self.records.filter_by_state(State.DROPPED):
+            if (bin_name := find_probable_bin(record)) and bin_name in bins:
+                record.reason = REASON_PROBABLY_FELL
+                self.records.set_placed(record, bin_name)
+        placed = [each for each in self.records.filter_by_state(State.PLACED) if each.bin in bins]
+        phantoms = self.records.filter_by_state(State.PHANTOM)
+        # A phantom after a failed pick may be an object that the pick pushed away.
+        self.records.archive([*placed, *(each for each in phantoms if not each.failed_pick_count)])
+
     def count_placed(self, detected_label: str, bin_name: str) -> int:
         """Return the number of items placed in a bin whose class the detectors report as `detected_label`."""
         return sum((item.detected_label, item.bin) == (detected_label, bin_name) for item in self.records.all)
@@ -93,7 +106,8 @@ class BinContents:
         """
         max_error = MAX_STANDARD_DEVIATIONS * math.hypot(observation.std, bias_std)
         for name, bin in self.bins.items():
-            if bin.contains(observation.position, max_error if self.count_objects_in(name) else 0.0):
+            is_near = bin.contains(observation.position, max_error)
+            if is_near and (bin.contains(observation.position) or self.count_objects_in(name)):
                 return name
         return None
 
@@ -140,15 +154,16 @@ class BinContents:
 
     def confirm_placed_items(self, detections: Detections, observations: Sequence[Observation]) -> None:
         """Set the time of the last detection of each placed item that an image shows in its bin."""
-        for record in self.records.filter_by_state(State.PLACED):
-            if self.find_presence(record, detections, observations) is Presence.PRESENT:
-                record.mark_as_detected_in_bin(detections.frame)
+        for bin_name in self.bins:
+            for record, presence in self.find_presences(bin_name, detections, observations).items():
+                if record.state is State.PLACED and presence is Presence.PRESENT:
+                    record.mark_as_detected_in_bin(detections.frame)
 
     def update_presence(
         self, record: ItemRecord, detections: Detections, observations: Sequence[Observation]
     ) -> Presence:
         """Record whether one image shows a placed item in its bin, and return the answer of the image."""
-        presence = self.find_presence(record, detections, observations)
+        presence = self.find_presences(record.bin, detections, observations)[record]
         if presence is Presence.GONE:
             record.belief.add_miss(
                 detections.error_rates, make_viewpoint_key(detections),
@@ -160,10 +175,10 @@ class BinContents:
             record.clear_viewpoints()
         return presence
 
-    def find_presence(
-        self, record: ItemRecord, detections: Detections, observations: Sequence[Observation]
-    ) -> Presence:
-        """Return whether one image shows a placed item in its bin.
+    def find_presences(
+        self, bin_name: str, detections: Detections, observations: Sequence[Observation]
+    ) -> dict[ItemRecord, Presence]:
+        """Return whether one image shows each placed item of a bin in the bin.
 
         `GONE` means only that the image does not show the item; the detector may have missed the item. A
         doubtful detection shows an item if the detection has the class of the item and lies at the slot of
@@ -172,28 +187,31 @@ class BinContents:
         another class in the bin may be the item, or the bin has several layers of objects, and an upper layer
         may hide the item.
         """
-        if not self.is_floor_visible(record.bin, detections):
-            return Presence.HIDDEN
+        items = [item for item in self.records.all if item.bin == bin_name]
+        presences = dict.fromkeys(items, Presence.HIDDEN)
+        if not items or not self.is_floor_visible(bin_name, detections):
+            return presences
         bias_std = detections.error_rates.bias
-        shown = [entry for entry in observations if self.find_bin_name(entry, bias_std) == record.bin]
-        alike = [entry for entry in shown if entry.detection.label == record.detected_label]
-        confident = [entry for entry in alike if entry.is_confident]
-        items = [item for item in self.records.all if item.bin == record.bin]
-        distances = {
-            item: self.measure_slot_distance(item, confident)
-            for item in items
-            if item.detected_label == record.detected_label
-        }
-        missing_count = len(distances) - len(confident)
-        for item, distance in distances.items():
-            if distance > self.config.gate >= self.measure_slot_distance(item, alike):
-                distances[item] = 0.0
-                missing_count -= 1
-        rank = sorted(distances, key=distances.__getitem__, reverse=True).index(record)
-        if rank >= missing_count:
-            return Presence.PRESENT
-        has_layers = self.find_next_slot_index(record.bin) > len(self.bins[record.bin].slots)
-        return Presence.UNSURE if has_layers or rank >= len(items) - len(shown) else Presence.GONE
+        shown = [entry for entry in observations if self.find_bin_name(entry, bias_std) == bin_name]
+        has_layers = self.find_next_slot_index(bin_name) > len(self.bins[bin_name].slots)
+        for label in {item.detected_label for item in items}:
+            alike = [entry for entry in shown if entry.detection.label == label]
+            confident = [entry for entry in alike if entry.is_confident]
+            distances = {
+                item: self.measure_slot_distance(item, confident)
+                for item in items
+                if item.detected_label == label
+            }
+            missing_count = len(distances) - len(confident)
+            for item, distance in distances.items():
+                if distance > self.config.gate >= self.measure_slot_distance(item, alike):
+                    distances[item] = 0.0
+                    missing_count -= 1
+            for rank, item in enumerate(sorted(distances, key=distances.__getitem__, reverse=True)):
+                is_unsure = has_layers or rank >= len(items) - len(shown)
+                missing = Presence.UNSURE if is_unsure else Presence.GONE
+                presences[item] = Presence.PRESENT if rank >= missing_count else missing
+        return presences
 
 
 def find_probable_bin(record: ItemRecord) -> str | None:

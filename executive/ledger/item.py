@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter, defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -270,20 +271,30 @@ class ItemRecords:
 
     Attributes:
         all: All records; adding or removing a record makes a new tuple.
+        archived: Last states of the items that the ledger no longer tracks, by name.
+        failed_picks: Item and position `(3,)` [m] of each failed attempt to pick; see `count_attempts`.
     """
 
     def __init__(self, emit: Emit) -> None:
         self.all: tuple[ItemRecord, ...] = ()
+        self.archived: dict[Item, ItemChanged] = {}
+        self.failed_picks: list[tuple[Item, Array]] = []
+        self._archived_counts: Counter[tuple[str, str]] = Counter()
         self._emit = emit
         self._records: dict[Item, ItemRecord] = {}
         self._name_counts: Counter[str] = Counter()
 
     def find(self, item: Item) -> ItemRecord:
-        """Return the record of an item.
+        """Return the record of an item, of an archived item a copy of its last state, which is in no bin.
 
         Raises:
             Fault: No item has this name.
         """
+        if (last := self.archived.get(item)) is not None:
+            return ItemRecord(
+                item, Belief(last.label, math.inf), np.array(last.position), 0, 0.0, False,
+                state=State(last.state), reason=last.reason, failed_pick_count=last.attempts,
+            )  # fmt: skip
         if item not in self._records:
             known_items = ", ".join(self._records) or "none"
             raise Fault(f'the ledger knows no item "{item}"; it knows: {known_items}')
@@ -320,6 +331,36 @@ class ItemRecords:
         """Remove an item that no event has reported yet."""
         del self._records[record.item]
         self.all = tuple(self._records.values())
+
+    def archive(self, records: Sequence[ItemRecord]) -> None:
+        """Keep only the last states of items that no longer change, which limits the memory of a long run."""
+        for record in records:
+            self.archived[record.item] = self._records.pop(record.item).event
+            self._archived_counts[record.state.value, record.label] += 1
+        self.all = tuple(self._records.values())
+        self.failed_picks = [pick for pick in self.failed_picks if pick[0] in self._records]
+
+    def count_archived(self, state: str, label: str | None = None) -> int:
+        """Return the number of archived items in a state; `label` restricts the count to one class."""
+        counts = self._archived_counts.items()
+        return sum(count for key, count in counts if key[0] == state and label in (None, key[1]))
+
+    def count_failed_pick(self, record: ItemRecord) -> None:
+        """Count a failed attempt to pick an item."""
+        record.failed_pick_count += 1
+        self.failed_picks.append((record.item, record.position))
+
+    def forget_failed_picks(self, record: ItemRecord, gate: float) -> None:
+        """Forget the failed attempts within `gate` [m] of an item that left its position."""
+        self.failed_picks = [pick for pick in self.failed_picks if record.distance_to(pick[1]) > gate]
+
+    def count_attempts(self, record: ItemRecord, gate: float) -> int:
+        """Return the number of failed attempts to pick an item, or another item within `gate` [m] of it.
+
+        Two objects of a class may exchange their items if looks miss one of them.
+        """
+        others = [position for item, position in self.failed_picks if item != record.item]
+        return record.failed_pick_count + sum(record.distance_to(each) <= gate for each in others)
 
     def emit(self, *records: ItemRecord) -> None:
         """Emit the current state of each given item as an event."""

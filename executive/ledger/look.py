@@ -125,8 +125,6 @@ def _may_be_same_object(
         return False
     if old_item.state is State.DROPPED:
         return new_item.was_place_searched and new_item.first_stamp > old_item.stamp
-    change_number = coverage.find_change_number(old_item.position, old_item.change_count)
-    may_be_moved_by_robot = change_number is not None and new_item.first_change_count >= change_number
     may_be_moved_by_person = (
         _compute_horizontal_distance(old_item, new_item) <= MAX_PUSH_DISTANCE
         and new_item.first_stamp > old_item.stamp
@@ -142,7 +140,10 @@ def _may_be_same_object(
         and old_item.belief.miss_probability <= MAX_MISS_PROBABILITY_OF_MOVED_ITEM
         and old_item.belief.probability_at_last_detection >= 0.5
     )
-    return is_missing and (may_be_moved_by_robot or may_be_moved_by_person)
+    if not is_missing or may_be_moved_by_person:
+        return is_missing
+    change_number = coverage.find_change_number(old_item.position, old_item.change_count)
+    return change_number is not None and new_item.first_change_count >= change_number
 
 
 def _compute_horizontal_distance(record: ItemRecord, other_record: ItemRecord) -> float:

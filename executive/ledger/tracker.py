@@ -15,9 +15,9 @@ from executive.cell.objects import Bin, Item, KnownItem, ObjectClass, Quotas, Ta
 from executive.cell.protocols import Presence, Routes
 from executive.cell.tools import ToolMeasurement
 from executive.errors import Fault
-from executive.events import Emit, ItemChanged
+from executive.events import BinsEmptied, Emit, ItemChanged
 from executive.geometry import Array
-from executive.ledger.bin_contents import BinContents, find_probable_bin
+from executive.ledger.bin_contents import REASON_PROBABLY_FELL, BinContents, find_probable_bin
 from executive.ledger.certainty import FINAL_STATES, Certainty, discard_moved_items
 from executive.ledger.coverage import Coverage
 from executive.ledger.item import ON_TABLE, ItemRecord, ItemRecords, State
@@ -68,14 +68,14 @@ class Tracker:
     def __post_init__(self) -> None:
         self.unknown_labels: Counter[str] = Counter()
         self.ignored_positions: list[Array] = []
-        self._failed_picks: list[tuple[Item, Array]] = []
-        """Item and position `(3,)` [m] of each failed attempt to pick; see `_count_attempts`."""
         self._bodies: list[tuple[Array, int]] = []
         """Objects of no item: position `(3,)` [m], and number of further looks until it is forgotten."""
         self._records = ItemRecords(self.emit)
         self._certainty = Certainty(self.config, self.distinct_labels)
         self._bin_contents = BinContents(self.config, self.bins, self.routes, self._records, self.quotas)
         self._coverage = Coverage(self.table)
+        self._confirmed_labels: set[str] = set()
+        """Classes that a measurement of the tool has confirmed, and "" after other measurements."""
         self._deferral_count = 0
         self._last_frame_id = 0
         self._last_stamp = 0.0
@@ -113,10 +113,11 @@ class Tracker:
     ) -> Presence:
         record = self._records.find(item)
         observations = [each for each in observations if each.detection.label not in self.ignored_labels]
-        if record.state is State.PLACED:
+        if record.state is State.PLACED and record.bin:
             presence = self._bin_contents.update_presence(record, detections, observations)
         elif record.state not in ON_TABLE:
-            return Presence.HIDDEN if record.state is State.HELD else Presence.GONE
+            # The place of an item whose bin was emptied is outside of the cell.
+            return Presence.HIDDEN if record.state in (State.HELD, State.PLACED) else Presence.GONE
         elif record.frame_id == detections.frame.id:
             return Presence.PRESENT
         else:
@@ -126,7 +127,7 @@ class Tracker:
             return presence
         if not self._certainty.is_position_empty(record):
             return Presence.UNSURE
-        self._forget_failed_picks(record)
+        self._records.forget_failed_picks(record, self.config.gate)
         record.mark_as_taken_away(self.change_count)
         self._records.emit(record)
         return Presence.GONE
@@ -136,7 +137,9 @@ class Tracker:
 
     def record_measurement(self, item: Item, measurement: ToolMeasurement) -> bool:
         record = self._records.find(item)
-        if self._certainty.add_measurement(record, measurement):
+        is_confirmed = self._certainty.add_measurement(record, measurement)
+        self._confirmed_labels.add(record.confirmed_label)
+        if is_confirmed:
             return True
         self._coverage.record_change(record.position, self.config.neighbourhood)
         self._records.emit(record)
@@ -155,7 +158,7 @@ class Tracker:
 
     def record_failed_pick(self, item: Item, *, found_table: bool = False) -> None:
         record = self._records.find(item)
-        self._count_failed_pick(record)
+        self._records.count_failed_pick(record)
         record.empty_probe_count += found_table
         self.invalidate_positions()
         self._records.emit(record)
@@ -177,7 +180,7 @@ class Tracker:
         record.was_taken_away = False
         self._records.change_state(record, State.DROPPED)
         self._bin_contents.set_prior_log_odds(record, landing)
-        self._count_failed_pick(record)
+        self._records.count_failed_pick(record)
         record.drop_count += 1
         record.change_count = self.change_count
         self.invalidate_positions()
@@ -187,7 +190,7 @@ class Tracker:
         if record.state is State.HELD:
             record.reason = ""
             record.slot = self._bin_contents.find_next_slot_index(bin)
-            self._forget_failed_picks(record)
+            self._records.forget_failed_picks(record, self.config.gate)
         # If the item later leaves the bin, an object seen before this time is not taken for the item.
         record.stamp = self._last_stamp
         record.belief.miss_probability = 1.0
@@ -223,8 +226,12 @@ class Tracker:
         if point is not None:
             self._add_body(np.array(point))
 
+    def empty_bins(self, bins: Collection[str]) -> None:
+        self._bin_contents.archive_items(bins)
+        self.emit(BinsEmptied(list(bins)))
+
     def set_final_states(self, *, completed: bool) -> None:
-        has_confirmed_item = any(record.confirmed_label for record in self._records.all)
+        has_confirmed_item = any(self._confirmed_labels)
         dropped = self._records.filter_by_state(State.DROPPED)
         dropped_items = [record for record in dropped if not record.was_taken_away]
         for record in self._records.all:
@@ -235,29 +242,29 @@ class Tracker:
             )  # fmt: skip
             if bin := find_probable_bin(record):
                 record.bin = bin
-                final_state = (State.PLACED, "it probably fell into the bin")
+                final_state = (State.PLACED, REASON_PROBABLY_FELL)
             if final_state is not None:
                 record.set_state(*final_state)
                 self._records.emit(record)
         self._records.emit(*discard_moved_items(self.records, dropped_items))
 
     def discard_rejected_and_skipped(self) -> None:
-        self._failed_picks.clear()
+        self._records.failed_picks.clear()
         for record in self._records.filter_by_state(State.REJECTED, State.SKIPPED):
             record.set_state(State.PHANTOM, "the run was resumed; the next look adds the object again")
             self._records.emit(record)
 
     def count_states(self) -> dict[str, int]:
-        counts = Counter(record.state for record in self._records.all)
-        totals = {state.value: counts[state] for state in (*FINAL_STATES, State.PHANTOM)}
-        return {"seen": counts.total() - counts[State.PHANTOM], **totals}
+        counts = Counter(item.state for item in self.list_items())
+        totals = {state.value: counts[state.value] for state in (*FINAL_STATES, State.PHANTOM)}
+        return {"seen": counts.total() - counts[State.PHANTOM.value], **totals}
 
     def list_items(self) -> Sequence[ItemChanged]:
-        return [record.event for record in self._records.all]
+        return [*self._records.archived.values(), *(record.event for record in self._records.all)]
 
     @property
     def records(self) -> Sequence[ItemRecord]:
-        """All items, in the order of the first detection."""
+        """All items except those of emptied bins, in the order of the first detection."""
         return self._records.all
 
     @property
@@ -300,7 +307,7 @@ class Tracker:
         return self._certainty.is_certain(self._records.find(item))
 
     def is_confirmed_by_tool(self, label: str) -> bool:
-        return any(record.confirmed_label == label for record in self._records.all)
+        return label in self._confirmed_labels
 
     def is_table_empty(self, label: str | None = None, ignored_items: Collection[Item] = ()) -> bool:
         routed_labels = [routed_label for routed_label in self.routes if label in (None, routed_label)]
@@ -339,9 +346,10 @@ class Tracker:
             state = "deferred" if record.deferral_rank else "open"
             if self._explain_skipped_item(record):
                 state = State.SKIPPED.value
+        attempt_count = self._records.count_attempts(record, self.config.gate)
         return KnownItem(
-            record.item, record.label, state, record.bin, record.position, self._count_attempts(record),
-            record.drop_count, record.deferral_count, record.deferral_rank,
+            record.item, record.label, state, record.bin, record.position, attempt_count, record.drop_count,
+            record.deferral_count, record.deferral_rank,
         )  # fmt: skip
 
     def list_known_items(self) -> Sequence[KnownItem]:
@@ -353,7 +361,8 @@ class Tracker:
 
     def count_items(self, state: str, label: str | None = None, bin: str | None = None) -> int:
         items = (self.describe(record.item) for record in self._records.all)
-        return sum(
+        archived_count = 0 if bin else self._records.count_archived(state, label)
+        return archived_count + sum(
             item.state == state and label in (None, item.label) and bin in (None, item.bin) for item in items
         )
 
@@ -376,15 +385,6 @@ class Tracker:
         if detections.view == "full":
             self._bin_contents.confirm_placed_items(detections, observations)
             self._bin_contents.mark_dropped_items_as_placed(detections, bin_names)
-
-    def _count_failed_pick(self, record: ItemRecord) -> None:
-        record.failed_pick_count += 1
-        self._failed_picks.append((record.item, record.position))
-
-    def _forget_failed_picks(self, record: ItemRecord) -> None:
-        """Forget the failed attempts at the position of an item that left the position."""
-        picks = self._failed_picks
-        self._failed_picks = [pick for pick in picks if record.distance_to(pick[1]) > self.config.gate]
 
     def _add_body(self, position: Array) -> None:
         """Record an object of no item at `position` `(3,)` [m], unless an item or a bin is there."""
@@ -414,14 +414,6 @@ class Tracker:
         else:
             record.set_state(State.REJECTED, self._explain_skipped_item(record))
         self._records.emit(record)
-
-    def _count_attempts(self, record: ItemRecord) -> int:
-        """Return the number of failed attempts to pick an item, or to pick another item at its position.
-
-        Two objects of a class may exchange their items if looks miss one of them.
-        """
-        others = [position for item, position in self._failed_picks if item != record.item]
-        return record.failed_pick_count + sum(record.distance_to(each) <= self.config.gate for each in others)
 
     def _is_separate(self, position: Array, targets: Collection[Target | Observation]) -> bool:
         """Return True if `position` `(3,)` [m] is neither in a bin nor at one of `targets`.

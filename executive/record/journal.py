@@ -8,7 +8,7 @@ import fcntl
 import hashlib
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import is_dataclass
 from operator import attrgetter
 from pathlib import Path
@@ -252,8 +252,8 @@ def _lock(fd: int, path: Path) -> None:
         ) from error
 
 
-def read_journal(path: Path) -> list[TimedEvent]:
-    """Return the events of a journal, one for each line.
+def read_journal(path: Path) -> Iterator[TimedEvent]:
+    """Yield the events of a journal, one for each line, while the file is read.
 
     An incomplete line and zero bytes at the end of the file are ignored; a power cut may leave them.
 
@@ -261,14 +261,10 @@ def read_journal(path: Path) -> list[TimedEvent]:
         InputError: The file cannot be read or has another format, a line contains no event, or the time of
             an event contradicts its control step.
     """
-    with explain_os_errors(InputError, f'cannot read the journal "{path}"'):
-        content = path.read_bytes()
-    timed_events: list[TimedEvent] = []
     control_period = 0.0
     has_present_inputs = True
     clock_offsets = [(0, 0.0)]  # Tick and value of each reading of the clock, without discarded ticks.
-    lines = content[: _measure_valid_length(content)].splitlines()
-    for line_number, line in enumerate(lines, start=1):
+    for line_number, line in enumerate(_read_lines(path), start=1):
         try:
             timed = decode_event(line)
             event = timed.event
@@ -291,11 +287,19 @@ def read_journal(path: Path) -> list[TimedEvent]:
             problem = f"{path}:{line_number}: this line is no event ({error})"
             cause = "an earlier version wrote the file, or somebody changed it after the run"
             raise InputError(f"{problem}; {cause}; restore a copy of the file") from error
-        timed_events.append(timed)
-    return timed_events
+        yield timed
 
 
-def find_run_start(timed_events: Sequence[TimedEvent], path: Path, advice: str) -> RunStarted:
+def _read_lines(path: Path) -> Iterator[bytes]:
+    """Yield the complete lines of a journal."""
+    with explain_os_errors(InputError, f'cannot read the journal "{path}"'), path.open("rb") as journal:
+        for line in journal:
+            length = len(line) if line.endswith(b"\n") else _measure_valid_length(line)
+            if length:
+                yield line[:length]
+
+
+def find_run_start(timed_events: Iterable[TimedEvent], path: Path, advice: str) -> RunStarted:
     """Return the event of the start of the run in the directory `path`.
 
     Raises:

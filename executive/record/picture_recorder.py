@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -21,7 +22,7 @@ from executive.record.timeline import Timeline, get_skill_name
 MAX_STORED_LOOKS = 24
 """Maximum number of stored looks; a look is an image (1.2 MB at 640 x 480 pixels) with its detections."""
 MAX_PICTURES = 200
-"""Maximum number of pictures of a run, so that a long run fills neither the disk nor the memory."""
+"""Maximum number of pictures of a run, the newest, so that a long run does not fill the disk."""
 PICTURE_WIDTH = 640
 """Width of a picture [pixel]; labels of boxes are legible at this width."""
 CAPTION_HEIGHT = 24
@@ -87,7 +88,7 @@ class PictureRecorder:
         self._selected_frame_id: int | None = None
         self._undrawn_frame_id: int | None = None
         """Number of the frame of the last look; None if a picture shows this frame."""
-        self._picture_count = 0
+        self._files: deque[Path] = deque()
         self.problem = ""
         """Message about the first missing picture, or ""."""
 
@@ -136,11 +137,9 @@ class PictureRecorder:
         if frame_id == self._undrawn_frame_id:
             self._undrawn_frame_id = None
         look = self._look_by_frame_id.get(frame_id)
-        if look is None or self._picture_count == MAX_PICTURES:
-            limits = f"the last {MAX_STORED_LOOKS} images are kept and {MAX_PICTURES} pictures are drawn"
-            self.problem = self.problem or f"missing pictures: only {limits}"
+        if look is None:
+            self.problem = f"missing pictures: only the last {MAX_STORED_LOOKS} images are kept"
             return
-        self._picture_count += 1
         item = selection.item if selection else ""
         name = "_".join(filter(None, (f"{timed.tick:06d}", item, failure.reason if failure else "")))
         frame, look_event = look
@@ -158,6 +157,9 @@ class PictureRecorder:
             path.parent.mkdir(parents=True, exist_ok=True)
             with replace_atomically(path) as temporary_file:
                 temporary_file.write_bytes(data)
+            self._files.append(path)
+            if len(self._files) > MAX_PICTURES:
+                self._files.popleft().unlink(missing_ok=True)
         except Exception as error:
             # Only the text of the first error is stored: an exception would keep all images in memory.
             self.problem = self.problem or f"not every picture was drawn: {error}"

@@ -229,7 +229,7 @@ def resume_run(path: Path, skills: Skills, options: RunOptions, record: RecordOp
     # The recorder locks the journal, so that no other process writes to the directory.
     recorder = Recorder(directory, saves_pictures=record.saves_pictures, resume=True)
     try:
-        events = read_journal(directory.journal)
+        events = list(read_journal(directory.journal))
         log = InputLog(events)
         start = find_run_start(events, path, "run the mission again")
         lacks_only_result = _check_end(directory, events)

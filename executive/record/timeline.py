@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import ClassVar
+from typing import ClassVar, cast
 
 from executive import events
 from executive.events import DetectedObject, FrameSearched, ItemChanged
@@ -207,8 +207,10 @@ class Timeline:
     """Observer that computes the state and the history of a run from its events.
 
     Attributes:
-        has_history: True to store all activations and selections; False to limit the memory in a long run.
+        has_history: True to store all activations, selections and items; False to limit the memory in a long
+            run: the items in emptied bins are forgotten.
         started, ended: Events of the start and the end of the run, or None.
+        ends: Ends and resumptions of the run.
         tick, clock: Control step and time of the last event [s].
         activation_by_path: Last activation of each node, by path of the node.
         end_counts: Number of ended activations by status, for each node by path.
@@ -228,6 +230,7 @@ class Timeline:
     has_history: bool = True
     started: events.RunStarted | None = None
     ended: events.RunEnded | None = None
+    ends: list[events.TimedEvent] = field(default_factory=list)
     tick: int = 0
     clock: float = 0.0
     activation_by_path: dict[str, Activation] = field(default_factory=dict)
@@ -290,10 +293,15 @@ class Timeline:
                 self.faults.append((self.clock, event.name))
             case events.FaultRaised():
                 self.traceback = event.traceback
+            case events.BinsEmptied(bins) if not self.has_history:
+                self._forget_items(bins)
             case events.RunStarted():
                 self.started = event
+            case events.RunResumed():
+                self.ends.append(timed)
             case events.RunEnded():
                 self.ended = event
+                self.ends.append(timed)
 
     def find_running_activations(self) -> list[Activation]:
         """Return the activations that have not ended, in the order of their starts."""
@@ -304,6 +312,16 @@ class Timeline:
     def root(self) -> Activation | None:
         """Last activation of the root of the tree, which starts before all other nodes; None at first."""
         return next(iter(self.activation_by_path.values()), None)
+
+    def _forget_items(self, bins: Sequence[str]) -> None:
+        """Forget phantoms and the items in emptied bins."""
+        items = self.items
+        for name, last in list(items.changes.items()):
+            if last.state == "phantom" or (last.state == "placed" and last.bin in bins):
+                for entries in (items.changes, items.change_times, items.tree_end_states, items.histories):
+                    cast("dict[str, object]", entries).pop(name)
+                self.selections.pop(name, None)
+                self.failures.pop(name, None)
 
     def _add_start(self, event: events.NodeStarted) -> None:
         interrupted = self.activation_by_path.get(event.node)

@@ -47,6 +47,7 @@ class RunControl:
         """Number of ticks that `step` requested and that have not begun."""
         self._wake_up = threading.Event()
         self._requests: deque[str] = deque()
+        self._emptied_bins: deque[list[str]] = deque()
         self._callbacks: list[Callable[[], None]] = []
 
     @property
@@ -85,6 +86,14 @@ class RunControl:
     def take_request(self) -> str | None:
         """Remove and return the oldest request; return None if there is no request."""
         return self._requests.popleft() if self._requests else None
+
+    def empty_bins(self, *names: str) -> None:
+        """Declare that bins have been emptied, without names all bins; their objects no longer count."""
+        self._emptied_bins.append(list(names))
+
+    def take_emptied_bins(self) -> list[list[str]]:
+        """Remove and return the names of the bins of each call of `empty_bins`."""
+        return [self._emptied_bins.popleft() for _ in range(len(self._emptied_bins))]
 
     def call_between_ticks(self, callback: Callable[[], None]) -> None:
         """Call `callback` between any two ticks, and periodically during a pause.

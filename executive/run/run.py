@@ -270,6 +270,9 @@ class Run:
                     if failure is None:
                         return _LoopEnd("SUCCESS")
                     return _LoopEnd("FAILURE", str(failure), failure.message, failure.path)
+                # A halt discards a control step only up to here; the objects disappear in the next step.
+                for bins in self.station.border.read("bins_emptied", control.take_emptied_bins):
+                    self.station.empty_bins(bins)
                 self.plan_ahead()
                 self.advance()
                 is_tree_ticked = False

@@ -298,14 +298,14 @@ class Border:
         self._inputs: dict[str, deque[RecordedInput]] = {}
         self._counted_tick = 0
         self._read_counts: Counter[str] = Counter()
-        self._last_values: dict[str, Any] = {}
+        self._last_values: dict[str, Any] = {"bins_emptied": []}
 
     def replay(self, inputs: Mapping[str, Iterable[RecordedInput]]) -> None:
         """Return recorded values by name of the input, in order, until `is_live` is set again."""
         self.is_live = False
         self._inputs = {name: deque(entries) for name, entries in inputs.items()}
         # The journal of a killed run may contain no value of the clock; every clock starts at 0.
-        self._last_values = {"clock": 0.0}
+        self._last_values |= {"clock": 0.0}
 
     def wrap(self, role: str, part: T, name: str = "") -> T:
         """Return a part of the outside with recorded inputs; in a replay, `part` may be None."""

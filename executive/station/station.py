@@ -130,6 +130,8 @@ class Station:
         self.border = Border(emit)
         self.tick_count = 0
         self.tick_callbacks: list[Callable[[], None]] = []
+        self._emptied_ticks: dict[str, int] = {}
+        """Tick in which a bin was emptied, by name, until its objects disappear."""
         bins = config.build_bins()
         classes = {label: section.build_class(label) for label, section in config.objects.items()}
         ignored_labels = set(config.unknown.ignore).difference(classes)
@@ -225,6 +227,7 @@ class Station:
                 report_selection=lambda target, bin: emit(
                     TargetSelected(target.item, target.label, target.frame, bin)
                 ),
+                empty_bins=self.empty_bins,
                 quotas=options.quotas,
                 behaviours=self.border.wrap("behaviours", Behaviours()),
             )
@@ -237,8 +240,30 @@ class Station:
         """Wait for the next tick of the devices."""
         self.driver.clock.wait_for_tick()
         self.tick_count += 1
+        if self._emptied_ticks:
+            self._remove_emptied_objects()
         for callback in self.tick_callbacks:
             callback()
+
+    def empty_bins(self, names: Sequence[str]) -> None:
+        """Record that bins have been emptied, without names all bins; unknown names are ignored.
+
+        If the driver knows its world, the objects in the bins disappear after the next tick of the devices.
+        """
+        bins = [name for name in self.cell.bins if not names or name in names]
+        self._emptied_ticks |= dict.fromkeys(bins, self.border.tick)
+        self.ledger.empty_bins(bins)
+
+    def _remove_emptied_objects(self) -> None:
+        """Let the objects in the emptied bins disappear; only those in a wrong bin stay in the audit."""
+        # A process may have been killed after the record of this tick, and before the objects disappeared.
+        bins = [name for name, tick in self._emptied_ticks.items() if tick >= self.border.tick - 1]
+        self._emptied_ticks.clear()
+        if not isinstance(self.driver, TrueWorld):
+            return
+        for each in list(self.driver.list_final_objects()):
+            if each.bin in bins and not each.is_held and not each.is_removed:
+                self.driver.remove_object(each, is_counted=_find_place(each, self.routes) != "right")
 
     def log_to(self, path: Path) -> None:
         """Start a log of the world if the driver can rebuild its world; called before the first tick."""
@@ -250,15 +275,21 @@ class Station:
         return self.driver.visuals() if isinstance(self.driver, Visible) else None
 
     def audit(self) -> Mapping[str, int] | None:
-        """Return the number of objects by true place, by `AUDIT_KEYS`; None without ground truth."""
+        """Return the number of objects by true place, by `AUDIT_KEYS`; None without ground truth.
+
+        An object that was taken out of an emptied bin is `right` unless it was in a wrong bin.
+        """
         if not isinstance(self.driver, TrueWorld):
             return None
         objects = self.driver.list_final_objects()
         gate = self.config.ledger.gate
         ignored_positions = self.ledger.ignored_positions
-        return count_outcomes(
+        counts = count_outcomes(
             objects, self.ledger.records, self.cell.bins, self.routes, gate, ignored_positions
         )
+        items_in_bins = [record for record in self.ledger.records if record.state is State.PLACED]
+        counts["right"] += self.ledger.count_items(State.PLACED.value) - len(items_in_bins)
+        return counts
 
     def close(self) -> None:
         """Release all resources; the station is unusable afterwards."""

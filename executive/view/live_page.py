@@ -108,9 +108,9 @@ class PageCommand:
     """Command of a browser that shows the page, or a report of the server about the browsers.
 
     Attributes:
-        name: `pause`, `resume`, `step`, `stop`, `request`; `render_on_cpu` if the browser renders on the CPU;
-            `browsers` if the number of browsers changed.
-        text: For `request`: the requested class, `rescan` or `quit`.
+        name: `pause`, `resume`, `step`, `stop`, `request`, `empty_bins`; `render_on_cpu` if the browser
+            renders on the CPU; `browsers` if the number of browsers changed.
+        text: For `request`: the requested class, `rescan` or `quit`; for `empty_bins`: the bin.
         browser_count: For `browsers`: number of browsers.
         is_cpu_rendering: For `browsers`: True if a browser renders on the CPU, and so slows down the run.
     """
@@ -291,6 +291,8 @@ class LivePage:
                 self._enqueue(self._last_searched_frame)
         elif control is not None and command.name == "request":
             control.add_request(command.text)
+        elif control is not None and command.name == "empty_bins":
+            control.empty_bins(command.text)
         elif control is not None:
             getattr(control, command.name)()
 
@@ -344,6 +346,11 @@ class PageState:
                 self._set_entry("nodes", node, {**counts, **entry, "item": activation.item})
             case events.ItemChanged():
                 self._set_entry("items", event.item, vars(event))
+            case events.BinsEmptied():
+                items = cast("JsonObject", self.values["items"])
+                for name in items.keys() - self._timeline.items.changes.keys():
+                    self._set_entry("items", name, None)
+                    del items[name]
             case events.TargetSelected():
                 self._set_values(decision=vars(event))
             case events.RunStarted():
@@ -359,7 +366,7 @@ class PageState:
         self.values |= values
         self._changes |= values
 
-    def _set_entry(self, key: str, name: str, value: JsonObject) -> None:
+    def _set_entry(self, key: str, name: str, value: JsonObject | None) -> None:
         for values in (self.values, self._changes):
             entries = cast("JsonObject", values.setdefault(key, {}))
             entries[name] = value

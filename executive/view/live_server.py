@@ -339,8 +339,8 @@ def parse_command(text: str) -> PageCommand | None:
     match command:
         case {"name": str(name)} if name in COMMANDS:
             return PageCommand(name)
-        case {"name": "request", "text": str(text)}:
-            return PageCommand("request", text)
+        case {"name": "request" | "empty_bins" as name, "text": str(text)}:
+            return PageCommand(name, text)
     return None
 
 

@@ -51,6 +51,8 @@ ACTIVITY_COLOURS = {LOOK: "#56B4E9", FAILED_ATTEMPTS: "#D55E00", WAITING: "#9aa5
 """Colours of the activities that are not skills; the colour of a skill is another colour of the palette."""
 MAX_EMBEDDED_SIZE = 3_000_000
 """Maximum total size of the embedded pictures, so that the page can be sent by e-mail [bytes]."""
+MAX_CARD_COUNT = 100
+"""Maximum number of items with a card and pictures; the items before them are rows of a table."""
 INTERRUPTED = "INTERRUPTED"
 """Status of a run whose journal has no end: the run was killed, or is still running."""
 
@@ -102,14 +104,13 @@ class ReportData:
 
     def __init__(self, path: Path) -> None:
         directory = RunDirectory(path)
-        events = read_journal(directory.journal)
         self.path = path
-        self.start = find_run_start(events, path, "there is nothing to report")
-        self.result = read_result(directory, events)
-        self.outcome = self.result or find_run_end(events)
+        self.start = find_run_start(read_journal(directory.journal), path, "there is nothing to report")
+        self.timeline = Timeline.from_events(read_journal(directory.journal))
+        self.result = read_result(directory, self.timeline.ends)
+        self.outcome = self.result or find_run_end(self.timeline.ends)
         self.status = INTERRUPTED if self.outcome is None else self.outcome.status
         self.nodes = read_tree(directory.tree)
-        self.timeline = Timeline.from_events(events)
         all_items = self.timeline.items.changes.values()
         self.last_item_changes = [item for item in all_items if item.state != "phantom"]
         self.activities, self.times_by_item = compute_activity_times(self.timeline, self.nodes)
@@ -169,6 +170,7 @@ def render_report(data: ReportData) -> str:
         reason=reason,
         verdict=". ".join(filter(None, (warning, _describe_end(data)))),
         to_dict=asdict,
+        max_card_count=MAX_CARD_COUNT,
         describe_unknown_labels=describe_unknown_labels,
         list_labelled_sentences=list_labelled_sentences,
         titles={node.path: node.title for node in data.nodes},
@@ -209,7 +211,8 @@ def _make_node_results(data: ReportData) -> dict[str, NodeResult]:
 def collect_pictures(folder: Path, item_names: Collection[str]) -> list[Picture]:
     """Return the pictures of a run: the last decision for each object, then all failures by time.
 
-    If the pictures are too large for one page, the first pictures are embedded and the others linked.
+    If the pictures are too large for one page, some are linked: first failures, then decisions for the first
+    objects.
     `folder` is the folder `frames` of the run; `item_names` are the names of all items of the run.
     """
     links = [_link_picture(file, item_names) for file in folder.glob("*.jpg")]
@@ -218,7 +221,7 @@ def collect_pictures(folder: Path, item_names: Collection[str]) -> list[Picture]
     failures = [picture for picture in pictures if picture.reason]
     shown_pictures = [*decisions.values(), *failures]
     free_size = MAX_EMBEDDED_SIZE
-    for picture in shown_pictures:
+    for picture in (*reversed(decisions.values()), *failures):
         file = folder / Path(picture.file).name
         # Base64 encodes 3 bytes as 4 characters.
         if file.stat().st_size * 4 / 3 <= free_size:

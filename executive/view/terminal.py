@@ -37,9 +37,11 @@ PAUSE_KEYS = (b"p", b" ")
 """Keys that pause or continue a run."""
 STEP_KEY = b"s"
 """Key that runs one control step."""
-HELP = "p pause, s step, Ctrl-C stop"
+EMPTY_KEY = b"e"
+"""Key that declares that all bins have been emptied."""
+HELP = "p pause, s step, e bins emptied, Ctrl-C stop"
 """Text about the keys while the run is not paused."""
-HELP_PAUSED = "paused: p continue, s step, Ctrl-C stop"
+HELP_PAUSED = "paused: p continue, s step, e bins emptied, Ctrl-C stop"
 """Text about the keys while the run is paused."""
 
 _STATUS_MARKS = {"RUNNING": ("▶", "bold yellow"), "SUCCESS": ("✓", "green"), "FAILURE": ("✗", "red")}
@@ -54,13 +56,13 @@ class LineView:
     Starts and ends of control nodes follow from the lines about their skills, and are not written.
 
     Attributes:
-        changes: Last change of each item by name.
+        timeline: Timeline of the run.
     """
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
         self._names_by_path: dict[str, str] = {}
-        self.changes: dict[str, ItemChanged] = {}
+        self.timeline = Timeline(has_history=False)
 
     def open(self, run: Run) -> None:
         """Store the names of the nodes of a run."""
@@ -71,8 +73,7 @@ class LineView:
         if text := self._describe_event(timed.event):
             self._stream.write(f"{timed.clock:9.2f} s  {text}\n")
             self._stream.flush()
-        if isinstance(timed.event, ItemChanged):
-            self.changes[timed.event.item] = timed.event
+        self.timeline(timed)
 
     def close(self) -> None:
         """Do nothing: every line is already flushed."""
@@ -100,6 +101,8 @@ class LineView:
                 return f"{self._names_by_path[event.node]}: {event.choice}{reason_text}"
             case events.RequestGiven():
                 return f"request: {event.request}"
+            case events.BinsEmptied():
+                return f"emptied: {', '.join(event.bins)}"
             case events.ItemChanged():
                 return self._describe_change(event)
         return ""
@@ -111,7 +114,7 @@ class LineView:
 
     def _describe_change(self, change: events.ItemChanged) -> str:
         """Return the text about a changed item; "" if only its position or its counts changed."""
-        last = self.changes.get(change.item)
+        last = self.timeline.items.changes.get(change.item)
         if last is not None and _get_described_fields(last) == _get_described_fields(change):
             return ""
         bin_text = f" in {change.bin}" if change.state == "placed" and change.bin else ""
@@ -135,7 +138,6 @@ class TerminalView:
         self._nodes: Sequence[OutlineNode] = ()
         self._lock = threading.Lock()
         self.timeline = Timeline(has_history=False)
-        self.changes = self.timeline.items.changes
         self._live = Live(
             console=console, get_renderable=self.render, refresh_per_second=REDRAWS_PER_SECOND, transient=True
         )
@@ -250,6 +252,8 @@ class KeyReader:
                         return
                     if key == STEP_KEY:
                         self.control.step()
+                    elif key == EMPTY_KEY:
+                        self.control.empty_bins()
                     elif key in PAUSE_KEYS and self.control.is_paused:
                         self.control.resume()
                     elif key in PAUSE_KEYS:
@@ -295,6 +299,9 @@ def format_summary(
     times = f"{result.robot_time_s:.1f} s on the robot's clock, {result.wall_time_s:.1f} s by the wall clock"
     groups = sorted(group_items_by_outcome(items).items())
     outcomes = [f"  {outcome}: {', '.join(names)}" for outcome, names in groups]
+    emptied_count = result.items.placed - sum(item.state == "placed" for item in items)
+    if emptied_count > 0:
+        outcomes.insert(0, f"  taken out of the bins: {emptied_count}")
     if labels_text := describe_unknown_labels(result.unknown_labels):
         outcomes.append(f"  {labels_text}")
     outcomes += [f"  detector error rates are assumed: {reason}" for reason in result.assumption_reasons]

@@ -63,7 +63,7 @@ def write_video(path: Path, file: Path) -> None:
 
 def _draw_frames(directory: RunDirectory, period: float) -> Iterator[Image]:
     """Yield the frames of a video; successive frames differ by `period` on the clock of the run [s]."""
-    events = read_journal(directory.journal)
+    events = list(read_journal(directory.journal))
     start = find_run_start(events, directory.path, "there is nothing to show")
     later_events = deque(InputLog(events).events)
     later_files = deque(sorted(directory.pictures.glob("*.jpg")))

@@ -99,7 +99,7 @@ def run_and_kill(
     os.kill(child, cause)
     os.waitpid(child, 0)
     try:
-        entries = read_journal(find_run(LATEST_LINK, runs) / "journal.jsonl")
+        entries = list(read_journal(find_run(LATEST_LINK, runs) / "journal.jsonl"))
     except ExecutiveError:
         return False
     end = find_run_end(entries)

@@ -16,6 +16,7 @@ from executive.mission.cell_file import load_cell
 from executive.record.result import Audit, ItemCounts, Result
 from executive.text.files import find_cell
 from tests.benchmarks import (
+    continuous,
     damaged_records,
     halts,
     hostile_input,
@@ -81,6 +82,16 @@ def test_wrong_claims_of_a_resumed_run_are_found() -> None:
     result = replace(result, audit=Audit(agrees=False, right=2))
     assert damaged_records.find_wrong_claims(result) == []
     assert len(damaged_records.find_wrong_claims(replace(result, status="SUCCESS"))) == 1
+
+
+@pytest.mark.slow
+def test_a_long_run_with_emptied_bins_is_measured(tmp_path: Path) -> None:
+    overrides = {"cell.kind": "fake", "cell.clock.step": "0.0166666667"}
+    mission = str(Path(continuous.__file__).with_suffix(".yaml"))
+    subject = load_mission_under_test(mission, overrides, has_oracle=False, seed=1)
+    figures = continuous.measure(subject, tmp_path, objects=30)
+    # The first objects load what later objects use; the table is searched for 20 s at the end.
+    assert {text.split()[0] for text in figures["problems"]} <= {"memory_kb", "tick_ratio", "journal_kb"}
 
 
 def test_growth_is_found() -> None:

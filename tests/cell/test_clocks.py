@@ -76,7 +76,7 @@ def halted_and_resumed(mission: LoadedMission, tmp_path_factory: pytest.TempPath
 def test_its_time_goes_on_after_a_resumption(halted_and_resumed: list[Result]) -> None:
     halted, result = halted_and_resumed
     assert (halted.status, result.status, result.items.placed) == ("HALTED", "SUCCESS", 2)
-    events = read_journal(Path(result.run) / "journal.jsonl")
+    events = list(read_journal(Path(result.run) / "journal.jsonl"))
     (number,) = [number for number, timed in enumerate(events) if isinstance(timed.event, RunResumed)]
     resumed = events[number]
     kept_times = [timed.clock for timed in events[:number] if timed.tick < resumed.event.valid_ticks]

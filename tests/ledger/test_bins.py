@@ -112,3 +112,20 @@ def test_a_dropped_item_is_placed_once_in_a_bin_of_its_class(
     changes = [event for event in bench.events if isinstance(event, ItemChanged)]
     assert [change.bin for change in changes if change.state == "placed"] == placed
     assert len(bench.ledger.records) == 1, "what lies in a bin is no item"
+
+
+def test_the_items_of_an_emptied_bin_stay_placed_and_no_longer_count_in_it(bench: Bench) -> None:
+    bench.look(CUBE, ("cube", 0.6, 0.1))
+    bench.place("cube-1")
+    bench.drop("cube-2", OVER)
+    ledger = bench.ledger
+    ledger.empty_bins(["red_bin"])
+    assert (ledger.count_objects_in("red_bin"), ledger.find_next_slot_index("red_bin")) == (0, 0)
+    assert (ledger.count_items("placed", "cube"), ledger.count_items("placed", bin="red_bin")) == (2, 0)
+    assert (ledger.describe("cube-1").state, ledger.describe("cube-1").bin) == ("placed", "")
+    assert bench.verify("cube-1", IN_RED) == "hidden"
+    assert bench.end() == {}, "a long run keeps no record of them"
+    assert [(item.item, item.bin) for item in ledger.list_items()] == [
+        ("cube-1", "red_bin"), ("cube-2", "red_bin"),
+    ]  # fmt: skip
+    assert (ledger.count_states()["seen"], ledger.count_states()["placed"]) == (2, 2)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 
 from executive.cell.frame import Answer, Detection, ErrorRates, Frame
+from executive.cell.objects import Bin
 from executive.errors import Crowded, DeadlinePassed, Unavailable
 from executive.geometry import Pose
 from executive.perception.detectors.cell_detector import MAX_BOXES, CellDetector
@@ -186,3 +188,10 @@ def test_an_unusable_answer_names_the_detector(
     clock.now = 0.05
     with pytest.raises(error, match=message):
         request.result()
+
+
+def test_boxes_in_bins_do_not_make_a_table_crowded(clock: SimpleNamespace) -> None:
+    everywhere = Bin("bin", np.zeros(3), np.array([99.0, 99.0, 0.1]), np.zeros((1, 2)))
+    detector = replace(make_detector(Kind([find()] * 200), clock), bins=[everywhere])
+    clock.now = 0.05
+    assert len(detector.request(FRAME, "full").future.result().confident) == 200

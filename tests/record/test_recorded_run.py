@@ -70,7 +70,7 @@ def test_leaves_a_directory_that_explains_the_run(run, tmp_path):
     }  # fmt: skip
     assert json.loads((left / "result.json").read_text()) == to_json(result)
     assert result.audit.agrees
-    events = read_journal(left / "journal.jsonl")
+    events = list(read_journal(left / "journal.jsonl"))
     (decision,) = (one for one in events if isinstance(one.event, TargetSelected))
     assert (left / "frames" / f"{decision.tick:06d}_{decision.event.item}.jpg").is_file()
     assert (type(events[0].event), type(events[-1].event)) == (RunStarted, RunEnded)

@@ -15,8 +15,9 @@ import pytest
 
 from executive.behaviours import load_skills
 from executive.cell.json_values import to_json
+from executive.drivers.fake import FakeDriver
 from executive.errors import InputError, Interrupted
-from executive.events import InputRead, ItemChanged, TimedEvent, ToolCommanded
+from executive.events import BinsEmptied, InputRead, ItemChanged, TimedEvent, ToolCommanded
 from executive.mission.load import LoadedMission, load_mission
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
@@ -56,6 +57,21 @@ class Cutter:
 
     def show_message(self, message: str) -> None:
         """Show nothing."""
+
+
+class Emptier(Cutter):
+    """Empties all bins after each placement; ends the process some events after the first of them."""
+
+    def open(self, run: Any) -> None:
+        self._control = run.control
+
+    def __call__(self, timed: TimedEvent) -> None:
+        if isinstance(timed.event, ItemChanged) and timed.event.state == "placed":
+            self._control.empty_bins()
+        if isinstance(timed.event, BinsEmptied) and self._tick == 0:
+            self._tick = timed.tick
+        if self._tick:
+            super().__call__(timed)
 
 
 def load(missions: Path, name: str) -> LoadedMission:
@@ -286,3 +302,26 @@ def test_a_decision_too_many_is_a_difference_in_a_run_that_was_cut_off_too(missi
     assert replay_and_compare(loaded, InputLog(cut), 3).is_equal
     done = replay_and_compare(loaded, InputLog(without), 3)
     assert (done.recorded, done.replayed and type(done.replayed.event)) == (None, ToolCommanded)
+
+
+SLOW = pytest.mark.slow
+
+
+@pytest.mark.parametrize("nth", [*(pytest.param(nth, marks=SLOW) for nth in (1, 2, 10)), None])
+def test_emptied_bins_stay_empty_in_a_replay_and_after_a_kill(
+    missions: Path, tmp_path: Path, nth: int | None
+) -> None:
+    loaded = load(missions, "sort_overhead")
+    with pytest.MonkeyPatch.context() as patch, pytest.raises(Cut):
+        if nth is None:
+            patch.setattr(FakeDriver, "remove_object", cut)
+        run_of(loaded, tmp_path, views=[Emptier(0, nth or 10**9)])
+    path = find_run("latest", tmp_path)
+    result = resumed(path, views=[Emptier()])
+    assert (result.status, result.disagreement) == ("SUCCESS", "")
+    assert result.items.placed == result.audit.right > 2
+    assert replay_run(path, read_journal(path / "journal.jsonl"), load_skills()).difference == ""
+
+
+def cut(*_: object, **__: object) -> None:
+    raise Cut

@@ -11,6 +11,7 @@ from failed_runs import PICK, FailedRun
 
 from executive.cell.frame import FrameCaptured
 from executive.events import (
+    BinsEmptied,
     BranchChosen,
     Event,
     FaultInjected,
@@ -146,3 +147,10 @@ def test_motions_targets_questions_and_injected_faults_are_kept() -> None:
     assert (timeline.selections, timeline.selection_times) == ({"cube-1": selected}, [(3.0, "cube-1")])
     assert (timeline.question, timeline.requests) == (None, [None])
     assert timeline.faults == [(6.0, "object removed")]
+
+
+@pytest.mark.parametrize(("history", "names"), [(False, ["cube-2"]), (True, ["cube-1", "cube-2"])])
+def test_without_history_the_items_of_emptied_bins_are_forgotten(history: bool, names: list[str]) -> None:
+    items = [item_changed(f"cube-{number}", "placed", bin=f"bin {number}") for number in (1, 2)]
+    timeline = folded(*items, BinsEmptied(["bin 1"]), history=history)
+    assert list(timeline.items.changes) == list(timeline.items.histories) == names

@@ -12,6 +12,9 @@ from executive.cell.devices import TrueObject
 from executive.cell.objects import UNKNOWN_LABEL, Bin
 from executive.geometry import Pose
 from executive.station.station import AUDIT_KEYS, count_outcomes
+from executive.testing.fake_cell import FakeCell
+from executive.testing.run_skill import run_skill
+from skills.items import EmptyBin
 
 ON_TABLE = (0.5, 0.0, 0.025)
 NONE = dict.fromkeys(AUDIT_KEYS, 0)
@@ -73,3 +76,14 @@ def test_a_removed_body_counts_as_if_it_still_lay_there_if_it_was_seen(bins, bin
 )
 def test_an_unknown_object_counts_if_it_was_seen_or_is_in_a_bin(bin, records, end: dict[str, int]) -> None:
     assert counted(RED, bin, *records, label=UNKNOWN_LABEL) == {**NONE, **end}
+
+
+def test_only_an_object_in_a_wrong_bin_stays_in_the_audit_when_the_bins_are_emptied() -> None:
+    fake = FakeCell()
+    for label, bin in (("cube", "red_bin"), ("duck", "red_bin"), ("cube", "blue_bin")):
+        fake.world.put(label, *fake.cell.bins[bin].position[:2])
+    run_skill(EmptyBin(bin="red_bin"), fake)
+    fake.advance()
+    left = [(each.label, each.bin) for each in fake.driver.list_final_objects()]
+    assert left == [("cube", "blue_bin"), ("duck", "red_bin")]
+    assert [each.label for each in fake.world.objects] == ["cube"]

@@ -54,7 +54,9 @@ def keyboard() -> Iterator[Keyboard]:
 
 def test_a_key_pauses_the_run_and_lets_it_go_on_and_others_mean_nothing(keyboard: Keyboard) -> None:
     keyboard.press("xqé\n\tp", True)
-    keyboard.press(" ", False)
+    assert keyboard.control.take_emptied_bins() == []
+    keyboard.press("e ", False)
+    assert keyboard.control.take_emptied_bins() == [[]], "all bins"
     keyboard.press("p", True)
 
 

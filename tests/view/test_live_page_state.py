@@ -19,7 +19,7 @@ from events import (
     skill_started,
 )
 
-from executive.events import Event, OperatorAsked, RequestGiven, TargetSelected
+from executive.events import BinsEmptied, Event, OperatorAsked, RequestGiven, TargetSelected
 from executive.geometry import Pose
 from executive.view.live_page import PageState, SearchedFrame, encode_poses
 
@@ -40,6 +40,13 @@ def test_the_news_of_an_event_is_its_change_of_the_page(event: Event, news: dict
     page_state = PageState()
     page_state.apply(at(0, event))
     assert page_state.take_changes() == {"clock": 0.0, **news}
+
+
+def test_the_items_of_an_emptied_bin_disappear() -> None:
+    page_state = PageState()
+    page_state.apply(at(0, item_changed("cube-1", "placed", bin="red_bin")))
+    page_state.apply(at(1, BinsEmptied(["red_bin"])))
+    assert (page_state.take_changes()["items"], page_state.values["items"]) == ({"cube-1": None}, {})
 
 
 def test_every_end_of_a_node_is_counted() -> None:

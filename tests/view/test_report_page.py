@@ -11,6 +11,7 @@ from typing import Any
 from page_reader import SECTIONS, Page
 
 from executive.record.journal import find_run_start, read_journal
+from executive.view import report
 from executive.view.report import ReportData, render_report
 
 NASTY = """</style></title><script>alert("x")</script><img src=x onerror='y'> & {{ 7 * 7 }} {% raw %} \x00"""
@@ -70,6 +71,16 @@ def test_the_sections_explain_a_failure_and_list_each_object(failed):
     repeat += ["--set", "cell.kind=fake", "--set", "cell.table.objects=[2, 2]"]
     assert f"repeat {shlex.join(repeat)} replay" in found.texts["commands"]
     assert "resume" not in found.texts["commands"]
+
+
+def test_objects_before_the_last_are_rows_of_a_table(failed, monkeypatch):
+    monkeypatch.setattr(report, "MAX_CARD_COUNT", 1)
+    found = page(failed)
+    assert (
+        "1 earlier objects object state bin or place failures reason sphere-1 rejected"
+        in found.texts["objects"]
+    )
+    assert "Image for the decision about sphere-1" not in [each.get("alt") for _, each in found.elements]
 
 
 def test_a_success_has_no_diagnosis(done):

@@ -56,7 +56,7 @@ def test_a_gif_shows_world_camera_picture_and_text(run: Path) -> None:
     frames = read_gif(run.parents[2] / "run.gif")
     assert frames[0].shape == (270, 640, 3)
     # Two seconds of the run take one second; equal frames are one frame in the file.
-    duration = read_journal(run / "journal.jsonl")[-1].clock
+    duration = list(read_journal(run / "journal.jsonl"))[-1].clock
     assert len(frames) == math.ceil(5 * duration) + 1
     world = np.s_[:252, :320]
     camera = np.s_[:252, 320:]

@@ -150,8 +150,8 @@ class SimDriver:
         body = self.tool.held_body
         return None if body is None else self.world.describe_object(body)
 
-    def remove_object(self, true_object: TrueObject) -> None:
-        self.world.remove_object(true_object.body)
+    def remove_object(self, true_object: TrueObject, *, is_counted: bool = True) -> None:
+        self.world.remove_object(true_object.body, is_counted=is_counted)
 
     def move_object(self, true_object: TrueObject, displacement: tuple[float, float]) -> None:
         X_WO = self.world.get_object_pose(true_object.body)
@@ -241,8 +241,8 @@ class WorldRebuilder:
             self.motion = None
         elif kind == world_log.SET_POSE:
             world.place_object(int(numbers[0]), Pose.of(numbers[1:4], numbers[4:]))
-        elif kind == world_log.REMOVE:
-            world.remove_object(int(numbers[0]))
+        elif kind in (world_log.REMOVE, world_log.FORGET):
+            world.remove_object(int(numbers[0]), is_counted=kind == world_log.REMOVE)
         else:
             actions = {
                 world_log.CLOSE: tool.close,

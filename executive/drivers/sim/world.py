@@ -111,10 +111,13 @@ class World(CellWorld):
         self.models[body] = model
         return body
 
-    def remove_object(self, body: int) -> None:
-        """Remove a loose object from the world."""
-        self.log_command(world_log.REMOVE, body)
-        self.removed_objects[body] = replace(self.describe_object(body), is_removed=True)
+    def remove_object(self, body: int, *, is_counted: bool = True) -> None:
+        """Remove a loose object from the world; unless it counts, forget it."""
+        self.log_command(world_log.REMOVE if is_counted else world_log.FORGET, body)
+        if is_counted:
+            self.removed_objects[body] = replace(self.describe_object(body), is_removed=True)
+        else:
+            self.rest_positions.pop(body, None)
         del self.labels[body]
         del self.models[body]
         self.client.removeBody(body)

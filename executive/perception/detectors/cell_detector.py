@@ -5,7 +5,8 @@ A kind of detector only searches a frame. This file adds all that every detector
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import contextlib
+from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -18,8 +19,9 @@ from executive.cell.config import CellConfig, DetectorConfig
 from executive.cell.device_config import CameraConfig
 from executive.cell.devices import DeviceClock
 from executive.cell.frame import Answer, Detection, ErrorRates, Frame, TrueFrame
-from executive.cell.objects import ObjectClass
+from executive.cell.objects import BIN_THICKNESS, Bin, ObjectClass
 from executive.errors import Crowded, DeadlinePassed, Unavailable
+from executive.perception.camera_model import intersect_plane
 from executive.perception.detectors.detector_registry import (
     DetectorContext,
     DetectorKind,
@@ -36,8 +38,11 @@ CLOCK_ROUNDING_ERROR = 1e-9
 MIN_VISIBLE_FRACTION = 0.7
 """Minimum unoccluded fraction of a box; boxes that the arm occludes more are ignored."""
 MAX_BOXES = 60
-"""Maximum number of boxes in one answer, including doubtful boxes and unknown labels. Shipped cells have at
-most 20 objects, and the time for the assignment of boxes to items grows more than linearly."""
+"""Maximum number of boxes outside of the bins in one answer, including doubtful boxes and unknown labels.
+Shipped cells have at most 20 objects, and the time for the assignment of boxes to items grows more than
+linearly."""
+MAX_BOXES_IN_BINS = 1000
+"""Maximum number of boxes in the bins in one answer; a cell has room for fewer visible objects."""
 MIN_BOX_SIDE = 2.0
 """Minimum longer side of a box [pixel]; a box in fractions of the image is smaller."""
 MAX_BOX_SIDE = 1e5
@@ -74,12 +79,13 @@ def build_cell_detectors(
     has_real_kind = not all(getattr(kind, "is_fake", False) for kind in kinds.values())
     envelopes = find_envelopes(config, cell_folder, folders) if has_real_kind else {}
     label_map = {label: object_class.detected_label for label, object_class in classes.items()}
+    bins = tuple(config.build_bins().values())
     detectors = {}
     for name, kind in kinds.items():
         section = config.detectors[name]
         envelope = envelopes.get(name, (section.error_rates, None))
         rate = partial(rate_frame, detector=name, envelope=envelope, config=config)
-        detectors[name] = CellDetector(name, kind, section.latency, clock, rate, label_map)
+        detectors[name] = CellDetector(name, kind, section.latency, clock, rate, label_map, bins)
     return detectors
 
 
@@ -94,6 +100,7 @@ class CellDetector:
         clock: Clock of the devices.
         rate: Returns the error rates of the detector for a frame.
         label_map: For each class of the cell, the class that detectors report for it.
+        bins: Bins of the cell, whose objects do not count as boxes of a crowded table.
     """
 
     name: str
@@ -102,6 +109,7 @@ class CellDetector:
     clock: DeviceClock
     rate: Callable[[Frame], ErrorRates]
     label_map: Mapping[str, str]
+    bins: Collection[Bin] = ()
 
     def __post_init__(self) -> None:
         is_instant = getattr(self.kind, "is_instant", False)
@@ -153,14 +161,28 @@ class CellDetector:
 
     def _check_boxes(self, detections: Sequence[Detection], frame: Frame, view: str) -> None:
         """Raise Crowded if there are too many boxes, and Unavailable if a detection is invalid."""
-        if len(detections) > MAX_BOXES:
-            problem = f"found {len(detections)} boxes in the view {view}, which cannot all be objects"
+        count = len(detections)
+        if MAX_BOXES < count <= MAX_BOXES + MAX_BOXES_IN_BINS:
+            count = sum(not self._is_in_bin(detection, frame) for detection in detections)
+        if count > MAX_BOXES:
+            problem = f"found {count} boxes in the view {view}, which cannot all be objects"
             advice = "raise `floor` of the detector in the cell file, or use another detector"
             raise Crowded(f"detector {self.name} {problem}; at most {MAX_BOXES} are allowed: {advice}")
         if invalid := next((found for found in detections if not _is_valid(found, frame)), None):
             box = f"{invalid.label[:MAX_LABEL_LENGTH]!r} {invalid.confidence:g} at {invalid.box}"
             image = f"an image of {frame.visible.shape[1]} x {frame.visible.shape[0]} pixels"
             raise Unavailable(f"detector {self.name} returned an invalid box: {box} in {image}")
+
+    def _is_in_bin(self, detection: Detection, frame: Frame) -> bool:
+        """Return True if the centre of a box lies in a bin, on its floor or at the height of its walls."""
+        for bin in self.bins:
+            for height in (0.0, float(bin.size[2])):
+                # The ray of a pixel above the horizon intersects no horizontal plane.
+                with contextlib.suppress(ValueError):
+                    centre = intersect_plane(frame.matrix, frame.X_WC, detection.centre, height)
+                    if bin.contains(centre, BIN_THICKNESS):
+                        return True
+        return False
 
 
 @dataclass(frozen=True, eq=False)

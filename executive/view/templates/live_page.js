@@ -51,6 +51,8 @@ function applyChanges(changes) {
     }
   }
   Object.assign(state.items, items);
+  // The objects of an emptied bin are forgotten.
+  for (const [name, item] of Object.entries(items ?? {})) if (!item) delete state.items[name];
   if ("run" in changes) {
     getElement("mission").textContent = `${changes.run.mission}, seed ${changes.run.seed}`;
     document.title = `${changes.run.mission} · executive`;
@@ -58,7 +60,7 @@ function applyChanges(changes) {
   if ("clock" in changes) getElement("clock").textContent = `${changes.clock.toFixed(1)} s`;
   if (items) showItems();
   if ("look" in changes || "decision" in changes || (items && state.look)) showCamera();
-  if ("choices" in changes) showChoices(changes.choices);
+  if ("choices" in changes) showButtons("request", "request", changes.choices && [...changes.choices, "rescan", "quit"]);
   if (changes.note) getElement("message").textContent = changes.note;
   if (nodes) scrollToRunningSkill();
   if ("result" in changes) showResult(changes.result);
@@ -118,6 +120,9 @@ function scrollToRunningSkill() {
 
 function showItems() {
   const rows = Object.values(state.items).filter((item) => item.state !== "phantom");
+  const bins = [...new Set(rows.filter((item) => item.state === "placed").map((item) => item.bin))].sort();
+  const shownBins = [...getElement("bins").querySelectorAll("button")].map((button) => button.textContent);
+  if (bins.join() !== shownBins.join()) showButtons("bins", "empty_bins", bins);
   getElement("items").querySelector("tbody").replaceChildren(...rows.map((item) => {
     const row = document.createElement("tr");
     row.className = item.state;
@@ -167,15 +172,15 @@ function makeElement(tag, attributes) {
   return element;
 }
 
-function showChoices(choices) {
-  const panel = getElement("request");
-  panel.hidden = !choices;
+// Show a button for each text, which sends a command with the text; hide the panel if there are no texts.
+function showButtons(id, name, texts) {
+  const panel = getElement(id);
+  panel.hidden = !texts?.length;
   for (const button of panel.querySelectorAll("button")) button.remove();
-  const texts = choices ? [...choices, "rescan", "quit"] : [];
-  for (const text of texts) {
+  for (const text of texts ?? []) {
     const button = panel.appendChild(document.createElement("button"));
     button.textContent = text;
-    button.onclick = () => send({ name: "request", text });
+    button.onclick = () => send({ name, text });
   }
 }
 
