@@ -110,7 +110,7 @@ class PictureRecorder:
                 look = self._timeline.items.histories[name].look
                 if last.state == "rejected" and look and last.label in self._unknown_labels:
                     self._queue(timed, TargetSelected(name, last.label, look.frame, ""), None)
-        if isinstance(event, events.ItemChanged | FrameSearched | TargetSelected):
+        if isinstance(event, events.ItemChanged | events.BinsEmptied | FrameSearched | TargetSelected):
             self._timeline(timed)
 
     def close(self, *, wait: bool = True) -> None:
