@@ -317,7 +317,7 @@ def test_emptied_bins_stay_empty_in_a_replay_and_after_a_kill(
             patch.setattr(FakeDriver, "remove_object", cut)
         run_of(loaded, tmp_path, views=[Emptier(0, nth or 10**9)])
     path = find_run("latest", tmp_path)
-    result = resumed(path, views=[Emptier()])
+    result = resumed(path)
     assert (result.status, result.disagreement) == ("SUCCESS", "")
     assert result.items.placed == result.audit.right > 2
     assert replay_run(path, read_journal(path / "journal.jsonl"), load_skills()).difference == ""
