@@ -49,8 +49,7 @@ class FakeWorld:
 
     def remove(self, true_object: TrueObject, *, is_counted: bool = True) -> None:
         """Remove the object with the body of `true_object`, which is not held; unless counted, forget it."""
-        removed = next(each for each in self.objects if each.body == true_object.body)
-        self.objects.remove(removed)
+        removed = self.objects.pop([each.body for each in self.objects].index(true_object.body))
         if is_counted:
             self.removed_objects.append(removed)
 

@@ -294,8 +294,7 @@ def _read_lines(path: Path) -> Iterator[bytes]:
     """Yield the complete lines of a journal."""
     with explain_os_errors(InputError, f'cannot read the journal "{path}"'), path.open("rb") as journal:
         for line in journal:
-            length = len(line) if line.endswith(b"\n") else _measure_valid_length(line)
-            if length:
+            if length := (len(line) if line.endswith(b"\n") else _measure_valid_length(line)):
                 yield line[:length]
 
 

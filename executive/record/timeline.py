@@ -316,12 +316,11 @@ class Timeline:
     def _forget_items(self, bins: Sequence[str]) -> None:
         """Forget phantoms and the items in emptied bins."""
         items = self.items
+        tables = (items.changes, items.change_times, items.tree_end_states, items.histories)
         for name, last in list(items.changes.items()):
             if last.state == "phantom" or (last.state == "placed" and last.bin in bins):
-                for entries in (items.changes, items.change_times, items.tree_end_states, items.histories):
-                    cast("dict[str, object]", entries).pop(name)
-                self.selections.pop(name, None)
-                self.failures.pop(name, None)
+                for table in (*tables, self.selections, self.failures):
+                    cast("dict[str, object]", table).pop(name, None)
 
     def _add_start(self, event: events.NodeStarted) -> None:
         interrupted = self.activation_by_path.get(event.node)

@@ -310,9 +310,8 @@ class TerminalOperator:
             # `select` does not see what an object such as `sys.stdin` has read into its buffer.
             elif select.select([sys.stdin], [], [], KEYBOARD_POLL_PERIOD)[0]:
                 data = os.read(sys.stdin.fileno(), MAX_READ_SIZE)
-                self._input = line[:MAX_LINE_LENGTH] + data
+                self._input = line[:MAX_LINE_LENGTH] + data if data else b""
                 if not data:
-                    self._input = b""
                     return line.decode(errors="replace")
         raise Stopped("the run was stopped before a request of the operator")
 

@@ -261,8 +261,14 @@ class Station:
         self._emptied_ticks.clear()
         if not isinstance(self.driver, TrueWorld):
             return
-        for each in list(self.driver.list_final_objects()):
-            if each.bin in bins and not each.is_held and not each.is_removed:
+        final_objects = self.driver.list_final_objects()
+        objects = [each for each in final_objects if not each.is_held and not each.is_removed]
+        if objects and self.ledger.find_held_item() and self.driver.find_held_object() is None:
+            # The ledger does not know yet that the nearest object has been released.
+            tip = self.unrecorded_cell.arm.tool_pose.position
+            objects.remove(min(objects, key=lambda each: math.dist(each.position, tip)))
+        for each in objects:
+            if each.bin in bins:
                 self.driver.remove_object(each, is_counted=_find_place(each, self.routes) != "right")
 
     def log_to(self, path: Path) -> None:

@@ -299,8 +299,7 @@ def format_summary(
     times = f"{result.robot_time_s:.1f} s on the robot's clock, {result.wall_time_s:.1f} s by the wall clock"
     groups = sorted(group_items_by_outcome(items).items())
     outcomes = [f"  {outcome}: {', '.join(names)}" for outcome, names in groups]
-    emptied_count = result.items.placed - sum(item.state == "placed" for item in items)
-    if emptied_count > 0:
+    if (emptied_count := result.items.placed - sum(item.state == "placed" for item in items)) > 0:
         outcomes.insert(0, f"  taken out of the bins: {emptied_count}")
     if labels_text := describe_unknown_labels(result.unknown_labels):
         outcomes.append(f"  {labels_text}")

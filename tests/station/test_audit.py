@@ -14,7 +14,9 @@ from executive.geometry import Pose
 from executive.station.station import AUDIT_KEYS, count_outcomes
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
+from skills.detect import Detect
 from skills.items import EmptyBin
+from skills.localize import Localize
 
 ON_TABLE = (0.5, 0.0, 0.025)
 NONE = dict.fromkeys(AUDIT_KEYS, 0)
@@ -76,6 +78,21 @@ def test_a_removed_body_counts_as_if_it_still_lay_there_if_it_was_seen(bins, bin
 )
 def test_an_unknown_object_counts_if_it_was_seen_or_is_in_a_bin(bin, records, end: dict[str, int]) -> None:
     assert counted(RED, bin, *records, label=UNKNOWN_LABEL) == {**NONE, **end}
+
+
+def test_an_object_that_is_just_released_stays_when_its_bin_is_emptied() -> None:
+    fake = FakeCell()
+    cube = fake.world.put("cube", 0.5, 0.0)
+    look = run_skill(Detect, fake).outputs
+    run_skill(Localize, fake, inputs=look)
+    fake.ledger.record_grasp("cube-1")
+    x, y, _ = fake.cell.bins["red_bin"].position
+    cube.position[:2] = (x, y)
+    fake.world.put("cube", x + 0.08, y)
+    fake.arm.set_tool_position(np.array((x, y, 0.08)))
+    fake.empty_bins([])
+    fake.advance()
+    assert fake.world.objects == [cube]
 
 
 def test_only_an_object_in_a_wrong_bin_stays_in_the_audit_when_the_bins_are_emptied() -> None:
