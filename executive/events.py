@@ -1,7 +1,8 @@
 """Events of a run: one frozen dataclass per kind of event.
 
 The parts of a run emit events; observers (journal, trace, pictures, views) receive each event with its time.
-The journal contains one JSON object per event; the keys of the object are the fields of the event class.
+The journal contains one JSON object per event; the keys of the object are the fields of the event class,
+except fields with an empty default value.
 """
 
 from __future__ import annotations

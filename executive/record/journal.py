@@ -50,7 +50,8 @@ def make_journal_schema() -> dict[str, JsonValue]:
             "tick": {"type": "integer", "minimum": 0, "maximum": MAX_TICK},
             "clock": {"type": "number", "minimum": 0},
         } | schema.get("properties", {})
-        definitions[kind] = schema | {"required": list(schema["properties"]), "additionalProperties": False}
+        required = ["kind", "tick", "clock", *schema.get("required", ())]
+        definitions[kind] = schema | {"required": required, "additionalProperties": False}
     return {
         "$schema": "http://json-schema.org/draft-07/schema#",
         "title": f"An event of a journal, format {JOURNAL_FORMAT}",
@@ -79,7 +80,10 @@ def encode_event(timed: TimedEvent) -> bytes:
         Fault: JSON cannot represent a value of the event, or the line would be too long.
     """
     kind = type(timed.event).__name__
-    entry = {"kind": kind, "tick": timed.tick, "clock": timed.clock, **vars(timed.event)}
+    values = vars(timed.event).items()
+    # A line contains no empty value that is the default of its field.
+    fields = {key: value for key, value in values if value or value != getattr(type(timed.event), key, ...)}
+    entry = {"kind": kind, "tick": timed.tick, "clock": timed.clock, **fields}
     try:
         # A file name that is not UTF-8 contains lone surrogates, which become question marks.
         line = (_ENCODER.encode(entry) + "\n").encode(errors="replace")

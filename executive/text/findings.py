@@ -66,7 +66,7 @@ NOWHERE = Source("", "").make_span()
 
 _MAX_EXCERPT_LENGTH = 140
 """Maximum number of characters of a source line in the text of a finding."""
-_MAX_ALTERNATIVES = 24
+_MAX_ALTERNATIVES = 30
 """Maximum number of allowed words in a hint."""
 MAX_PRINTED_FINDINGS = 50
 """Maximum number of findings in a message; the message also states the number of omitted findings."""

@@ -63,7 +63,7 @@ def test_writes_an_object_per_line_with_its_kind_and_time_first_and_nothing_once
     journal.close()
     journal.close()
     journal(at(4, END))
-    text = '{"kind": "NodeStarted", "tick": 3, "clock": 0.0125, "node": "größe", "skill": "", "item": ""}\n'
+    text = '{"kind": "NodeStarted", "tick": 3, "clock": 0.0125, "node": "größe"}\n'
     assert path.read_text() == text
 
 
