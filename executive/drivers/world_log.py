@@ -18,7 +18,7 @@ import numpy as np
 
 from executive.errors import Fault, InputError, describe_os_error, explain_os_errors
 from executive.motion.trajectory import Trajectory
-from executive.text.files import MAX_RECORD_SIZE, read_file
+from executive.text.files import read_lines
 
 
 class LogFile:
@@ -73,6 +73,8 @@ class LogFile:
             os.close(file)
 
 
+MAX_LINE_LENGTH = 10_000_000
+"""Maximum length of a command in a log [byte]; a motion of a minute has 3 MB."""
 FILE_HEADER = b"executive world 4\n"
 """First line of every log of commands, with the version of the format."""
 
@@ -116,7 +118,7 @@ class CommandLog(LogFile):
     """
 
     def __init__(self, path: Path, *, resume: bool = False) -> None:
-        self._length = len(_read_complete_lines(path)) if resume else 0
+        self._length = sum(map(len, _read_complete_lines(path))) if resume else 0
         super().__init__(path, "the log of the world", self._length)
         if not resume:
             self._append(FILE_HEADER)
@@ -142,7 +144,9 @@ def read_commands(path: Path) -> Iterator[Command]:
     Raises:
         InputError: The file cannot be read, or is no valid log.
     """
-    for number, line in enumerate(_read_complete_lines(path).split(b"\n")[1:-1], start=2):
+    for number, line in enumerate(_read_complete_lines(path), start=1):
+        if number == 1:
+            continue
         try:
             kind, *arguments = json.loads(line)
         except (ValueError, TypeError, RecursionError) as error:
@@ -153,10 +157,12 @@ def read_commands(path: Path) -> Iterator[Command]:
         yield Command(kind, arguments)
 
 
-def _read_complete_lines(path: Path) -> bytes:
-    content = read_file(path, 10 * MAX_RECORD_SIZE)
-    if not content.startswith(FILE_HEADER):
+def _read_complete_lines(path: Path) -> Iterator[bytes]:
+    """Yield the header and the complete lines of a log."""
+    lines = read_lines(path, MAX_LINE_LENGTH)
+    if next(lines, b"") != FILE_HEADER:
         header = FILE_HEADER.decode().strip()
         raise InputError(f'"{path}" is no log of a world: it does not begin with "{header}"')
+    yield FILE_HEADER
     # A power failure may leave zero bytes at the end of the file.
-    return content[: content.rfind(b"\n") + 1]
+    yield from (line for line in lines if line.endswith(b"\n"))

@@ -22,10 +22,11 @@ from executive.events import JOURNAL_FORMAT, Event, RunEnded, RunStarted, TimedE
 from executive.record.picture_recorder import PictureRecorder
 from executive.record.run_directory import RunDirectory
 from executive.station.border import check_input
+from executive.text.files import read_lines
 
 MAX_TICK = 10**9
 """Maximum number of control steps of a run; 48 days at 240 control steps per second."""
-MAX_LINE_LENGTH = 4_000_000
+MAX_LINE_LENGTH = 1_000_000
 """Maximum length of an event in a journal [byte]; the largest events of a run without errors have 2000."""
 CLOCK_TOLERANCE = 1e-5
 """Maximum difference between the clock of an event and the time of its control step [s]."""
@@ -69,7 +70,9 @@ def _to_json_type(value: object) -> object:
     raise TypeError(f"JSON has no equivalent of a {type(value).__name__}")
 
 
-_ENCODER = json.JSONEncoder(ensure_ascii=False, allow_nan=False, check_circular=False, default=_to_json_type)
+_ENCODER = json.JSONEncoder(
+    ensure_ascii=False, allow_nan=False, check_circular=False, separators=(",", ":"), default=_to_json_type
+)
 """Encoder of events, which are dataclasses with mappings."""
 
 
@@ -268,9 +271,11 @@ def read_journal(path: Path) -> Iterator[TimedEvent]:
     control_period = 0.0
     has_present_inputs = True
     clock_offsets = [(0, 0.0)]  # Tick and value of each reading of the clock, without discarded ticks.
-    for line_number, line in enumerate(_read_lines(path), start=1):
+    for line_number, line in enumerate(read_lines(path, MAX_LINE_LENGTH), start=1):
+        if not line.endswith(b"\n") and not _measure_valid_length(line):
+            return
         try:
-            timed = decode_event(line)
+            timed = decode_event(line.rstrip(b"\0"))
             event = timed.event
             if isinstance(event, RunStarted):
                 control_period = event.step
@@ -292,14 +297,6 @@ def read_journal(path: Path) -> Iterator[TimedEvent]:
             cause = "an earlier version wrote the file, or somebody changed it after the run"
             raise InputError(f"{problem}; {cause}; restore a copy of the file") from error
         yield timed
-
-
-def _read_lines(path: Path) -> Iterator[bytes]:
-    """Yield the complete lines of a journal."""
-    with explain_os_errors(InputError, f'cannot read the journal "{path}"'), path.open("rb") as journal:
-        for line in journal:
-            if length := (len(line) if line.endswith(b"\n") else _measure_valid_length(line)):
-                yield line[:length]
 
 
 def find_run_start(timed_events: Iterable[TimedEvent], path: Path, advice: str) -> RunStarted:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os.path
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path, PurePosixPath
 
 import executive
-from executive.errors import InputError
+from executive.errors import InputError, explain_os_errors
 from executive.text.findings import Source, suggest_choice
 
 MAX_TEXT_SIZE = 1_000_000
@@ -122,6 +122,23 @@ def read_file(path: Path, max_size: int = MAX_TEXT_SIZE) -> bytes:
         raise InputError(f"there is no file {path}") from None
     except (OSError, ValueError) as error:
         raise InputError(f"{path} cannot be read: {getattr(error, 'strerror', error)}") from None
+
+
+def read_lines(path: Path, max_length: int) -> Iterator[bytes]:
+    """Yield the lines of a file, of at most `max_length` [byte], with their line feeds, while it is read.
+
+    Raises:
+        InputError: The file is missing, a folder, a pipe or a device, cannot be read, or has a longer line.
+    """
+    with explain_os_errors(InputError, f'cannot read "{path}"'):
+        # Opening a pipe would wait for a writer.
+        if os.path.exists(path) and not os.path.isfile(path):
+            raise InputError(f"{path} is {_describe_kind(path)}, not a file")
+        with path.open("rb") as file:
+            while line := file.readline(max_length + 1):
+                if len(line) > max_length:
+                    raise InputError(f"{path} has a line of more than {max_length} bytes; it is damaged")
+                yield line
 
 
 def read_source(path: Path) -> Source:

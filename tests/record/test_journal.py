@@ -63,7 +63,7 @@ def test_writes_an_object_per_line_with_its_kind_and_time_first_and_nothing_once
     journal.close()
     journal.close()
     journal(at(4, END))
-    text = '{"kind": "NodeStarted", "tick": 3, "clock": 0.0125, "node": "größe"}\n'
+    text = '{"kind":"NodeStarted","tick":3,"clock":0.0125,"node":"größe"}\n'
     assert path.read_text() == text
 
 
@@ -165,7 +165,7 @@ def test_a_torn_end_is_left_out_and_cut_off_where_the_journal_goes_on(path, cont
 
 
 def test_a_new_run_needs_a_new_journal_and_one_that_goes_on_an_old_one(path):
-    with pytest.raises(InputError, match="cannot read the journal"):
+    with pytest.raises(InputError, match="cannot read"):
         list(read_journal(path))
     with pytest.raises(InputError, match="cannot open the journal"):
         Journal(path, resume=True)
@@ -200,7 +200,7 @@ HALTED = '{"kind": "RunHalted", "tick": 1, "clock": 0.1, "is_tree_ticked": true}
         (encode_event(at(1, read("clock", "now"))), "the clock is 'now'"),
         (encode_event(at(1, skill_ended("a"))).replace(b"SUCC", b"ODDN"), '"status" of NodeEnded'),
         (
-            encode_event(at(0, run_started())).replace(b'"format": 4', b'"format": 2'),
+            encode_event(at(0, run_started())).replace(b'"format":4', b'"format":2'),
             '"format" of RunStarted',
         ),
     ],
@@ -214,12 +214,12 @@ def test_a_line_that_is_no_event_is_an_error_with_its_number(path, line, why):
 
 
 def test_an_event_that_is_too_long_for_a_journal_is_a_fault() -> None:
-    with pytest.raises(Fault, match=r"InputRead of tool\.load has .* at most 4000000 are allowed"):
+    with pytest.raises(Fault, match=r"InputRead of tool\.load has .* at most 1000000 are allowed"):
         encode_event(at(1, read("tool.load", "x" * 5_000_000)))
 
 
 def test_inputs_of_an_earlier_format_are_read_as_they_are(path: Path) -> None:
-    start = encode_event(at(0, run_started())).replace(b'"format": 4', b'"format": 3')
+    start = encode_event(at(0, run_started())).replace(b'"format":4', b'"format":3')
     path.write_bytes(start + encode_event(at(1, read("observations", [["a value of five parts"]]))))
     assert [type(timed.event).__name__ for timed in read_journal(path)] == ["RunStarted", "InputRead"]
 

@@ -76,7 +76,7 @@ def run_with(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> RunWith:
         result = record_run(loaded, RunOptions(0, make_cell=make_cell), tmp_path / "runs")
         assert cells[0].arm.at_rest
         path = Path(result.run)
-        events = read_journal(path / "journal.jsonl")
+        events = list(read_journal(path / "journal.jsonl"))
         assert isinstance(events[-1].event, RunEnded)
         assert replay_run(path, events, load_skills()).is_equal
         assert write_report(path).is_file()
