@@ -121,7 +121,9 @@ def to_text(value: object) -> str:
     """Return the text of any value, without its middle if it is longer than `MAX_TEXT_LENGTH`."""
     try:
         text = str(value)
-    except Exception:  # The value may be an object of another project.
+    except Interrupted:
+        raise
+    except BaseException:  # The value may be an object of another project.
         return f"a {type(value).__name__} without text"
     half_length = MAX_TEXT_LENGTH // 2
     return text if len(text) <= MAX_TEXT_LENGTH else f"{text[:half_length]}…{text[1 - half_length :]}"

@@ -19,6 +19,8 @@ from multiprocessing import util as multiprocessing_util
 from types import TracebackType
 from typing import Any, TypeVar
 
+from executive.errors import shorten_quotations
+
 ReturnT = TypeVar("ReturnT")
 """Type of the return value of a submitted function."""
 
@@ -107,18 +109,22 @@ def limit_end_time(exit_code: int = 0) -> None:
         threads = {*threading.enumerate()} - {threading.main_thread()}
         names = sorted(f'"{thread.name}"' for thread in threads if not thread.daemon)
         problem = f"still running after {MAX_END_TIME:.0f} s: {', '.join(names)}"
-        sys.stderr.write(f"note: the process ends without waiting for its threads, {problem}\n")
-        sys.stderr.flush()
-        os._exit(exit_code)
+        try:
+            note = f"note: the process ends without waiting for its threads, {problem}\n"
+            sys.stderr.write(shorten_quotations(note))
+            sys.stderr.flush()
+        finally:
+            os._exit(exit_code)
 
     threading.Thread(target=end_process, name="end process", daemon=True).start()
 
 
-def shut_down(pool: ThreadPoolExecutor) -> None:
-    """Cancel the pending calls of a pool, and wait at most `MAX_END_TIME` for the end of the running call."""
+def shut_down(pool: ThreadPoolExecutor) -> bool:
+    """Cancel the pending calls of a pool; return True if the running call ends within `MAX_END_TIME`."""
     waiter = threading.Thread(target=pool.shutdown, kwargs={"cancel_futures": True}, daemon=True)
     waiter.start()
     waiter.join(MAX_END_TIME)
+    return not waiter.is_alive()
 
 
 def build_command(module: str, *arguments: str) -> list[str]:

@@ -284,9 +284,10 @@ def list_bundle(settings: SweepSettings) -> dict[str, bytes]:
             plugin does not exist.
     """
     paths = {settings.scene} if settings.scene else set()
+    skills = load_skills()
     for variant in settings.variants:
         overrides = {**settings.overrides, **variant}
-        loaded = load_mission(settings.mission, load_skills(), overrides, None, settings.replacing_cell)
+        loaded = load_mission(settings.mission, skills, overrides, None, settings.replacing_cell)
         paths.update(*map(list_model_files, loaded.files))
         folder = loaded.cell_path.parent
         options = [value for one in loaded.cell_config.detectors.values() for value in one.options.values()]

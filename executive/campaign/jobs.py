@@ -38,7 +38,7 @@ MAX_HALT_DELAY = 0.1
 """Maximum time between a signal to this process and the signals to its workers [s]."""
 MAX_CRASHES = 2
 """A job fails as soon as this many worker processes have died while they executed it."""
-_SYSTEM_ERRORS = map(os.strerror, (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.ENOMEM, errno.EMFILE))
+_SYSTEM_ERRORS = [os.strerror(number) for number in (errno.ENOSPC, errno.EDQUOT, errno.ENOMEM, errno.EMFILE)]
 _OTHER_ERRORS = "MemoryError|bad_alloc|RecordLost|BrokenProcessPool|KilledWorker|BadZipFile|zlib"
 _ENVIRONMENT_FAULT = re.compile("|".join((*_SYSTEM_ERRORS, _OTHER_ERRORS)), re.IGNORECASE)
 """Text of a fault whose cause is the disk, the memory or a killed process, not the run."""

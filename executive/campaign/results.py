@@ -39,9 +39,7 @@ MAX_RUN_COUNT = 50_000
 """Maximum number of runs of a sweep; all rows are in memory while a sweep is summarized."""
 MAX_VARIANT_COUNT = 500
 """Maximum number of variants of a sweep; each variant is checked before the first run."""
-MAX_ROW_COUNT = 2_000_000
-"""Maximum number of rows of a table that are read."""
-MAX_FILE_SIZE = 200_000_000
+MAX_FILE_SIZE = 500_000_000
 """Maximum size of a database that is read [byte]."""
 MAX_TEXT_LENGTH = 1_000_000
 """Maximum length of a text that is read [characters]."""
@@ -71,18 +69,21 @@ class SweepSettings:
 
     def __post_init__(self) -> None:
         """Raise InputError if the sweep has no run, or more runs or variants than can be summarized."""
-        variant_count = math.prod(map(len, self.variations.values()))
-        if not 0 < self.run_count <= MAX_RUN_COUNT or variant_count > MAX_VARIANT_COUNT:
+        if not 0 < self.run_count <= MAX_RUN_COUNT or self.variant_count > MAX_VARIANT_COUNT:
             raise InputError(
-                f"the sweep has {self.run_count} runs of {variant_count} variants; a sweep has 1 to "
+                f"the sweep has {self.run_count} runs of {self.variant_count} variants; a sweep has 1 to "
                 f"{MAX_RUN_COUNT} runs of at most {MAX_VARIANT_COUNT} variants; change the seeds or --vary"
             )
 
     @property
+    def variant_count(self) -> int:
+        """Number of combinations of the varied values."""
+        return math.prod(map(len, self.variations.values()))
+
+    @property
     def run_count(self) -> int:
         """Number of runs of the complete sweep."""
-        seed_count = self.last_seed - self.first_seed + 1
-        return math.prod(map(len, self.variations.values())) * seed_count
+        return self.variant_count * (self.last_seed - self.first_seed + 1)
 
     @property
     def combinations(self) -> list[tuple[dict[str, str], int]]:
@@ -301,7 +302,7 @@ class ResultsDatabase:
 
     def delete_environment_faults(self) -> None:
         """Delete all rows of the runs that ended because of disk, memory or a killed process."""
-        query = f"SELECT run_index FROM runs WHERE reason = '{ENVIRONMENT_REASON}'"
+        query = f"SELECT run_index FROM runs WHERE status = 'FAULT' AND reason = '{ENVIRONMENT_REASON}'"
         with self._convert_errors(), self._connection as connection:
             for table in ("items", "skills", "runs"):
                 connection.execute(f"DELETE FROM {table} WHERE run_index IN ({query})")
@@ -339,7 +340,7 @@ class ResultsDatabase:
         # The adapter also converts the numbers of SQLite, which has no Boolean type.
         adapter = TypeAdapter(row_class)
         with self._convert_errors():
-            cursor = self._connection.execute(f"SELECT * FROM {source} LIMIT {MAX_ROW_COUNT}")
+            cursor = self._connection.execute(f"SELECT * FROM {source}")
             return [adapter.validate_python(_decode_columns(row)) for row in cursor]
 
     @contextlib.contextmanager

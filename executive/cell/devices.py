@@ -409,7 +409,13 @@ class TrueObject:
 
 @runtime_checkable
 class TrueWorld(Protocol):
-    """Capability of a driver: its world is known and can be changed, by audits, tests and injected faults."""
+    """Capability of a driver: its world is known and can be changed, by audits, tests and injected faults.
+
+    Attributes:
+        forgotten_count: Number of objects that were removed uncounted.
+    """
+
+    forgotten_count: int
 
     def list_objects(self) -> Sequence[TrueObject]:
         """Return all loose objects, in the order of their creation, without removed objects."""

@@ -304,7 +304,9 @@ class FakeDriver:
         index = None if held is None else self.world.objects.index(held)
         objects = [encode_object(each) for each in self.world.objects]
         removed_objects = [encode_object(each) for each in self.world.removed_objects]
-        state = [self.clock.tick_count, self.last_command_tick, self.arm.q, index, objects, removed_objects]
+        forgotten_count = self.world.forgotten_count
+        ticks = [self.clock.tick_count, self.last_command_tick]
+        state = [*ticks, self.arm.q, index, objects, removed_objects, forgotten_count]
         text = json.dumps(state, default=np.ndarray.tolist).encode()
         # Blanks pad the text to the length of the longest state so far, to overwrite all old text.
         self._log_length = max(self._log_length, len(text))
@@ -312,17 +314,17 @@ class FakeDriver:
 
     def rebuild(self, path: Path) -> int:
         try:
-            ticks, last_command_tick, q, held, objects, removed_objects = json.loads(
-                read_file(path, MAX_RECORD_SIZE)
-            )
+            state = json.loads(read_file(path, MAX_RECORD_SIZE))
+            ticks, last_command_tick, q, held, objects, removed_objects, forgotten_count = state
             self.clock.tick_count = int(ticks)
             self.last_command_tick = int(last_command_tick)
             self.arm.q = np.array(q, dtype=float).reshape(self.arm.q.shape)
             restored = [decode_object(body, *each) for body, each in enumerate(objects + removed_objects)]
             self.world.objects = restored[: len(objects)]
             self.world.removed_objects = restored[len(objects) :]
+            self.world.forgotten_count = int(forgotten_count)
             self.world.held_object = None if held is None else self.world.objects[held]
-        except (ValueError, TypeError, LookupError, RecursionError) as error:
+        except (ValueError, TypeError, LookupError, RecursionError, OverflowError) as error:
             raise InputError(f'the world in "{path}" is damaged: {error}; run the mission again') from error
         self._step_count = round(self.clock.now / STEP)
         self.log_to(path)
@@ -340,6 +342,10 @@ class FakeDriver:
 
     def find_held_object(self) -> TrueObject | None:
         return self.world.held_object
+
+    @property
+    def forgotten_count(self) -> int:
+        return self.world.forgotten_count
 
     def remove_object(self, true_object: TrueObject, *, is_counted: bool = True) -> None:
         self.world.remove(true_object, is_counted=is_counted)

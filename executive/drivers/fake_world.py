@@ -27,7 +27,8 @@ class FakeWorld:
         classes: Classes of the objects, by label.
         bins: The bins of the cell.
         objects: The objects, in the order in which they were added.
-        removed_objects: The objects that were removed from the world.
+        removed_objects: The objects that were removed from the world, without the forgotten ones.
+        forgotten_count: Number of forgotten objects.
         held_object: The object that the tool holds, or None.
         is_commanded: True if arm or tool has received a command since the last control step.
     """
@@ -36,6 +37,7 @@ class FakeWorld:
     bins: Collection[Bin] = ()
     objects: list[TrueObject] = field(default_factory=list)
     removed_objects: list[TrueObject] = field(default_factory=list)
+    forgotten_count: int = 0
     held_object: TrueObject | None = None
     is_commanded: bool = False
 
@@ -52,6 +54,8 @@ class FakeWorld:
         removed = self.objects.pop([each.body for each in self.objects].index(true_object.body))
         if is_counted:
             self.removed_objects.append(removed)
+        else:
+            self.forgotten_count += 1
 
     def release(self, *, is_dropped: bool = False) -> None:
         """Let the held object fall straight down; if it is dropped, it rolls to a free position."""

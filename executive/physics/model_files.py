@@ -38,7 +38,7 @@ MAX_GROUP_COUNT = 1_000
 and of the files that a Wavefront or material file names."""
 FIXED_JOINTS = "joint[@type='fixed'][parent]"
 """Path of the fixed joints of a URDF."""
-_NAMED_FILE = re.compile(r"^\s*(?:mtllib|map_\w+|bump|disp|decal|refl)\s+(.*\S)", re.MULTILINE)
+_NAMED_FILE = re.compile(r"^[ \t]*(?:mtllib|map_\w+|bump|disp|decal|refl)[ \t]+(\S.*)", re.MULTILINE)
 """Name of a further file in a Wavefront mesh or its materials."""
 MESH_KINDS = {".obj": "Wavefront", ".stl": "STL", ".dae": "COLLADA"}
 """Formats of mesh files by suffix."""
@@ -106,8 +106,10 @@ def check_files(path: Path, root: Element, max_triangle_count: float = MAX_TRIAN
             raise InputError(f"the model {path.name} has an XML namespace, {element.tag}; remove it")
         if element.tag == "mesh":
             read_mesh(find_mesh(path, element), max_triangle_count)
-        elif "filename" in element.attrib:
+        elif element.tag == "texture":
             read_image_header(find_mesh(path, element))
+        elif "filename" in element.attrib:
+            _normalize_name(path, element.attrib["filename"])
 
 
 def _merge_links(path: Path, root: Element) -> None:
@@ -253,8 +255,8 @@ def list_named_files(path: Path) -> list[Path]:
         values = _NAMED_FILE.findall(path.read_text(encoding="utf-8", errors="surrogateescape"))
     elif path.suffix.lower() == ".urdf":
         values = [element.attrib["filename"] for element in read_robot(path).findall(".//*[@filename]")]
-    # Options of a material may precede the name.
-    names = dict.fromkeys(name for value in values for name in (value, *value.split()[-1:]))
+    # Options of a material may precede the name, and PyBullet reads only one word of some names.
+    names = dict.fromkeys(name for value in values for name in (value.strip(), *value.split()))
     if len(names) > MAX_GROUP_COUNT:
         raise InputError(f"the model {path.name} names more than {MAX_GROUP_COUNT} files; join them")
     named_files = [path.parent / _normalize_name(path, name) for name in names]
@@ -311,6 +313,8 @@ def read_mesh(path: Path, max_triangle_count: float = MAX_TRIANGLE_COUNT) -> Tri
         raise InputError(f"{problem}; simplify the mesh")
     if suffix == ".obj":
         for material in list_named_files(path):
+            if material.suffix.lower() != ".mtl":
+                raise InputError(f"the model {path.name} names {material.name}, which is no .mtl file")
             for texture in list_named_files(material):
                 read_image_header(texture)
     return points, faces

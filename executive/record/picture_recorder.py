@@ -138,7 +138,9 @@ class PictureRecorder:
             self._undrawn_frame_id = None
         look = self._look_by_frame_id.get(frame_id)
         if look is None:
-            self.problem = f"missing pictures: only the last {MAX_STORED_LOOKS} images are kept"
+            self.problem = (
+                self.problem or f"missing pictures: only the last {MAX_STORED_LOOKS} images are kept"
+            )
             return
         item = selection.item if selection else ""
         name = "_".join(filter(None, (f"{timed.tick:06d}", item, failure.reason if failure else "")))

@@ -198,6 +198,7 @@ def execute_recorded(
         except BaseException as error:  # The driver may be code of another project.
             message = f"the true state of the world cannot be read: {describe_error(error)}"
             run_end = replace(run_end, status="FAULT", reason="fault", message=message, node="")
+            run.emit(run_end)
     station = run.station
     path = recorder.directory.path
     item_counts = station.ledger.count_states()

@@ -14,7 +14,7 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager, nullco
 from types import FrameType
 from typing import TYPE_CHECKING, NoReturn
 
-from executive.errors import InputError, Interrupted, Stopped, TickOverdue, shorten_quotations
+from executive.errors import InputError, Interrupted, Stopped, TickOverdue, shorten_quotations, to_text
 
 if TYPE_CHECKING:
     from executive.events import Emit
@@ -34,14 +34,14 @@ class RunControl:
         is_stopped: True after the first call of `stop`.
         is_idle: True while `wait_while_paused` has nothing to do.
         is_time_held: True while the run waits for a person.
-        hold_clock: Function that returns a context in which the clock of the run stands still.
+        hold_time: Function that returns a context in which the clock of the run stands still.
     """
 
     def __init__(self) -> None:
         self.is_stopped = False
         self.is_idle = True
         self.is_time_held = False
-        self.hold_clock: Callable[[], AbstractContextManager[None]] = nullcontext
+        self.hold_time: Callable[[], AbstractContextManager[None]] = nullcontext
         self._is_paused = False
         self._remaining_ticks = 0
         """Number of ticks that `step` requested and that have not begun."""
@@ -89,7 +89,7 @@ class RunControl:
 
     def empty_bins(self, *names: str) -> None:
         """Declare that bins have been emptied, without names all bins; their objects no longer count."""
-        self._emptied_bins.append(list(names))
+        self._emptied_bins.append(list(map(to_text, names)))
 
     def take_emptied_bins(self) -> list[list[str]]:
         """Remove and return the names of the bins of each call of `empty_bins`."""
@@ -102,16 +102,6 @@ class RunControl:
         """
         self._callbacks.append(callback)
         self.is_idle = False
-
-    @contextmanager
-    def hold_time(self) -> Iterator[None]:
-        """Let the clock of the run stand still in the `with` block, in which the run waits for a person."""
-        self.is_time_held = True
-        try:
-            with self.hold_clock():
-                yield
-        finally:
-            self.is_time_held = False
 
     def wait_while_paused(self) -> None:
         """Call the callbacks; in a pause, wait for `resume` or `stop`, or begin a tick of `step`."""
@@ -176,21 +166,23 @@ TICK_CHECK_PERIOD = 0.5
 def limit_tick_time(control: RunControl, get_tick: Callable[[], int]) -> Iterator[None]:
     """Raise `TickOverdue` in a control step that does not end; only in the main thread of a process.
 
-    The limit does not apply while the run waits for a person, or while a debugger stops the program.
+    The limit does not apply while the run waits for a person, under a debugger or another tracer, and in a
+    call of native code.
 
     Args:
         control: Control of the run.
         get_tick: Function that returns the number of the current control step.
     """
-    checked_tick = -1
+    checked_state = (-1, False)
     tick_time = 0.0
     limit = MAX_TICK_TIME
 
     def check_tick(*_: object) -> None:
-        nonlocal checked_tick, tick_time, limit
+        nonlocal checked_state, tick_time, limit
         tick = get_tick()
-        if tick != checked_tick or control.is_time_held or sys.gettrace() is not None:
-            checked_tick = tick
+        state = (tick, control.is_stopped)
+        if state != checked_state or control.is_time_held or sys.gettrace() is not None:
+            checked_state = state
             tick_time = 0.0
             return
         tick_time += TICK_CHECK_PERIOD
@@ -204,11 +196,11 @@ def limit_tick_time(control: RunControl, get_tick: Callable[[], int]) -> Iterato
         yield
         return
     with handle_signals([signal.SIGALRM], check_tick):
-        signal.setitimer(signal.ITIMER_REAL, TICK_CHECK_PERIOD, TICK_CHECK_PERIOD)
+        previous_timer = signal.setitimer(signal.ITIMER_REAL, TICK_CHECK_PERIOD, TICK_CHECK_PERIOD)
         try:
             yield
         finally:
-            signal.setitimer(signal.ITIMER_REAL, 0.0)
+            signal.setitimer(signal.ITIMER_REAL, *previous_timer)
 
 
 RESCAN = "rescan"
@@ -326,7 +318,4 @@ def parse_request(text: str, choices: Sequence[str]) -> str | None:
         return None
     if text in ("s", RESCAN):
         return RESCAN
-    numbers = [str(number) for number in range(len(choices))]
-    if text in numbers:
-        return choices[numbers.index(text)]
-    return next((label for label in choices if label.lower() == text), "")
+    return next((label for index, label in enumerate(choices) if text in (str(index), label.lower())), "")

@@ -139,7 +139,7 @@ class Run:
         self._planner = LookaheadPlanner(station.unrecorded_cell)
         self.add_observer(self._planner.on_event)
         self.clock = RunClock(control_period)
-        self.control.hold_clock = self._hold_clock
+        self.control.hold_time = self._hold_time
         self.cell = replace(station.cell, clock=self.clock)
 
     def set_tree(self, root: TreeNode) -> None:
@@ -182,7 +182,7 @@ class Run:
         clock.offset = border.read("clock", lambda: self.station.driver.clock.now - tick * clock.step)
 
     @contextmanager
-    def _hold_clock(self) -> Iterator[None]:
+    def _hold_time(self) -> Iterator[None]:
         """Let the clock of the devices continue after the `with` block at its time before the block."""
         if not self.station.border.is_live:
             yield
@@ -190,7 +190,11 @@ class Run:
         clock = self.station.driver.clock
         now = clock.now
         wall_time = time.monotonic()
-        yield
+        self.control.is_time_held = True
+        try:
+            yield
+        finally:
+            self.control.is_time_held = False
         clock.begin(now)
         self._wall_start += time.monotonic() - wall_time
 

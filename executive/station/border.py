@@ -6,6 +6,7 @@ the behaviours of other projects. Replays, resumed runs and injected faults stan
 
 from __future__ import annotations
 
+import builtins
 import contextlib
 import re
 from collections import Counter, deque
@@ -372,10 +373,13 @@ class Border:
 
 def _make_exception(reading: InputRead) -> BaseException:
     """Return an exception with the recorded class name and message; an unknown class is created."""
-    exception_class = getattr(errors, reading.exception, None)
-    if not (isinstance(exception_class, type) and issubclass(exception_class, ExecutiveError | Stopped)):
-        exception_class = type(reading.exception, (Exception,), {})
-    return exception_class(reading.value)
+    name = reading.exception
+    candidates: tuple[Any, ...] = (getattr(errors, name, None), getattr(builtins, name, None), Exception)
+    known = next(each for each in candidates if isinstance(each, type) and issubclass(each, BaseException))
+    if issubclass(known, ExecutiveError | Stopped):
+        return known(str(reading.value))
+    base = Exception if issubclass(known, Exception) else BaseException
+    return type(name, (base,), {})(reading.value)
 
 
 class Recorded:

@@ -126,9 +126,9 @@ class PlannerService:
         return self._stored_plan
 
     def close(self) -> None:
-        """Cancel the plans that have not started, and end the planning thread."""
-        shut_down(self._worker)
-        self._release()
+        """Cancel the plans that have not started, and end the planning thread, unless a plan does not end."""
+        if shut_down(self._worker):
+            self._release()
 
 
 class PlannedArm:

@@ -293,8 +293,7 @@ class Station:
         counts = count_outcomes(
             objects, self.ledger.records, self.cell.bins, self.routes, gate, ignored_positions
         )
-        items_in_bins = [record for record in self.ledger.records if record.state is State.PLACED]
-        counts["right"] += self.ledger.count_items(State.PLACED.value) - len(items_in_bins)
+        counts["right"] += self.driver.forgotten_count
         return counts
 
     def close(self) -> None:
@@ -355,7 +354,8 @@ def count_outcomes(
       position has a horizontal distance of at most `max_distance` [m] from a rest position of the object
       or from the centre of its bin
 
-    A removed object counts only if it was seen: by its bin if the tool placed it there, else as `elsewhere`.
+    A removed object counts only if it was seen, or in a wrong bin: by its bin if the tool placed it there,
+    else as `elsewhere`.
     An object with `UNKNOWN_LABEL` that was never seen counts only if it is in a wrong bin, not as `unseen`;
     so does any other unseen object that was detected with an ignored label, at one of `ignored_positions`.
     """
@@ -381,7 +381,8 @@ def _is_any_near(points: Sequence[Array], positions: Sequence[Array], max_distan
 def _find_outcomes(final_object: TrueObject, place: str, is_seen: bool) -> Iterator[str]:
     """Yield the keys of the counts that include an object with a final `place`."""
     if final_object.is_removed:
-        if is_seen:
+        # The ledger has no record of an object in an emptied bin.
+        if is_seen or place == "wrong_bin":
             was_placed = place in ("right", "wrong_bin") and not final_object.is_dropped
             yield place if was_placed else "elsewhere"
     elif place == "wrong_bin" and final_object.is_dropped:

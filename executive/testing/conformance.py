@@ -21,7 +21,7 @@ from executive.cell.device_config import STEP
 from executive.cell.frame import Detections
 from executive.cell.objects import Item, Target
 from executive.cell.tools import ToolMeasurement
-from executive.errors import to_text
+from executive.errors import Interrupted, to_text
 from executive.manipulation.motions import capture_and_detect, complete, localize_and_observe
 from executive.mission.ports import describe_type, find_element_type, is_assignable
 from executive.skill import ANY, EMPTY, HALT, HOLDING, Direction, Param, Port, Skill
@@ -260,6 +260,8 @@ class SkillRuns:
         initial_values = str(values)
         try:
             result = run_skill(self.skill, fake, inputs=values, max_ticks=MAX_TICKS, halt_at=halt_at)
+        except Interrupted:
+            raise
         except BaseException as error:
             message = f"{type(error).__name__}: {to_text(error)}"
             result = SkillResult("FAULT", "", message, ticks=fake.tick_count - first_tick)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os.path
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
+from typing import BinaryIO
 
 import executive
-from executive.errors import InputError, explain_os_errors
+from executive.errors import InputError
 from executive.text.findings import Source, suggest_choice
 
 MAX_TEXT_SIZE = 1_000_000
@@ -111,13 +113,22 @@ def read_file(path: Path, max_size: int = MAX_TEXT_SIZE) -> bytes:
     Raises:
         InputError: The file is missing, a folder, a pipe or a device, too large, or cannot be read.
     """
+    with _open_file(path) as file:
+        content = file.read(max_size + 1)
+    if len(content) > max_size:
+        raise InputError(f"{path} is larger than {max_size} bytes, the maximum size of such a file")
+    return content
+
+
+@contextmanager
+def _open_file(path: Path) -> Iterator[BinaryIO]:
+    """Yield the open file; raise InputError if it is missing, no regular file, or cannot be read."""
     try:
         # Opening a pipe would wait for a writer.
         if os.path.exists(path) and not os.path.isfile(path):
             raise InputError(f"{path} is {_describe_kind(path)}, not a file")
-        if path.stat().st_size > max_size:
-            raise InputError(f"{path} is larger than {max_size} bytes, the maximum size of such a file")
-        return path.read_bytes()
+        with path.open("rb") as file:
+            yield file
     except FileNotFoundError:
         raise InputError(f"there is no file {path}") from None
     except (OSError, ValueError) as error:
@@ -127,18 +138,18 @@ def read_file(path: Path, max_size: int = MAX_TEXT_SIZE) -> bytes:
 def read_lines(path: Path, max_length: int) -> Iterator[bytes]:
     """Yield the lines of a file, of at most `max_length` [byte], with their line feeds, while it is read.
 
+    A long line of zero bytes, which a power cut may leave at the end of a file, ends the lines.
+
     Raises:
         InputError: The file is missing, a folder, a pipe or a device, cannot be read, or has a longer line.
     """
-    with explain_os_errors(InputError, f'cannot read "{path}"'):
-        # Opening a pipe would wait for a writer.
-        if os.path.exists(path) and not os.path.isfile(path):
-            raise InputError(f"{path} is {_describe_kind(path)}, not a file")
-        with path.open("rb") as file:
-            while line := file.readline(max_length + 1):
-                if len(line) > max_length:
-                    raise InputError(f"{path} has a line of more than {max_length} bytes; it is damaged")
-                yield line
+    with _open_file(path) as file:
+        while line := file.readline(max_length + 1):
+            if len(line) > max_length:
+                if not line.strip(b"\0"):
+                    return
+                raise InputError(f"{path} has a line of more than {max_length} bytes; it is damaged")
+            yield line
 
 
 def read_source(path: Path) -> Source:

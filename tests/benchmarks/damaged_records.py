@@ -273,7 +273,7 @@ def _resume_truncated(
     kept = snapshots.worlds[number]
     world.write_bytes(world.read_bytes()[:kept] if isinstance(kept, int) else kept)
     length = rng.randrange(snapshots.lengths[number])
-    _truncate(path / "journal.jsonl", length)
+    os.truncate(path / "journal.jsonl", length)
     return _resume(subject, path, f"{case}, journal cut at {length}, world at snapshot {number}")
 
 
@@ -289,17 +289,13 @@ def _resume_killed(subject: MissionUnderTest, base: Path, case: int) -> Figures:
         if file.name == "journal.jsonl" or _is_command_log(file):
             kept = (file.stat().st_size - 1) // BLOCK * BLOCK - BLOCK * rng.randrange(MAX_LOST_BLOCKS)
             # The header of the log of a world is on the disk before the run begins.
-            _truncate(file, max(kept, 0 if file.name == "journal.jsonl" else 40))
+            os.truncate(file, max(kept, 0 if file.name == "journal.jsonl" else 40))
     return _resume(subject, path, str(case))
 
 
 def _is_command_log(file: Path) -> bool:
     """Return True if the log of a world contains commands, and not the state of a fake world."""
     return file.read_bytes().startswith(FILE_HEADER)
-
-
-def _truncate(file: Path, length: int) -> None:
-    file.write_bytes(file.read_bytes()[:length])
 
 
 def _resume(subject: MissionUnderTest, path: Path, case: str) -> Figures:

@@ -11,7 +11,7 @@ import subprocess
 import sys
 import zipfile
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -195,32 +195,33 @@ def test_a_worker_with_other_software_is_described() -> None:
         check_environment(client, worker)
 
 
-def start_dask(folder: Path, *words: str) -> subprocess.Popen[str]:
+@contextmanager
+def running(folder: Path, pattern: str, *words: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """Start a program of dask; yield it, and the first group of the pattern in its log; kill it in the end."""
     command = [sys.executable, "-m", "dask", *words, "--no-dashboard"]
-    return subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True, start_new_session=True)
-
-
-def wait_for(log: Any, pattern: str) -> str:
-    """Read the log of a program up to a line that contains the pattern, and return the first group."""
-    return next(match[1] for line in log if (match := re.search(pattern, line)))
+    process = subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    try:
+        log: Any = process.stderr
+        yield process, next(match[1] for line in log if (match := re.search(pattern, line)))
+    finally:
+        process.kill()
+        process.communicate()
 
 
 @pytest.fixture
-def cluster(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[str]]]]:
-    """Address of a scheduler, and its two workers; without a nanny, a killed worker stays dead."""
-    scheduler = start_dask(tmp_path, "scheduler", "--host", "127.0.0.1", "--port", "0")
-    processes = [scheduler]
-    try:
-        address = wait_for(scheduler.stderr, r"Scheduler at:\s*(tcp://\S+)")
-        words = ("worker", address, "--nthreads", "1", "--no-nanny", "--local-directory", str(tmp_path / "w"))
-        processes += [start_dask(tmp_path, *words) for _ in range(2)]
-        for worker in processes[1:]:
-            wait_for(worker.stderr, r"(Registered to)")
-        yield address, processes[1:]
-    finally:
-        for process in processes:
-            process.kill()
-            process.communicate()
+def scheduler(tmp_path: Path) -> Iterator[str]:
+    """Address of a scheduler."""
+    pattern = r"Scheduler at:\s*(tcp://\S+)"
+    with running(tmp_path, pattern, "scheduler", "--host", "127.0.0.1", "--port", "0") as (_, address):
+        yield address
+
+
+@pytest.fixture
+def workers(scheduler: str, tmp_path: Path) -> Iterator[list[subprocess.Popen[str]]]:
+    """Two workers of the scheduler; without a nanny, a killed worker stays dead."""
+    words = ("worker", scheduler, "--nthreads", "1", "--no-nanny", "--local-directory", str(tmp_path / "w"))
+    with ExitStack() as stack:
+        yield [stack.enter_context(running(tmp_path, "(Registered to)", *words))[0] for _ in range(2)]
 
 
 def sweep(folder: Path, cluster: str | None = None, **options: Any) -> list[RunRow]:
@@ -233,12 +234,11 @@ def sweep(folder: Path, cluster: str | None = None, **options: Any) -> list[RunR
 
 @pytest.mark.slow
 def test_a_killed_worker_costs_only_time(
-    cluster: tuple[str, list[subprocess.Popen[str]]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    scheduler: str, workers: list[subprocess.Popen[str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    address, workers = cluster
     monkeypatch.chdir(tmp_path)
     remote = sweep(
-        tmp_path / "remote", address, on_progress=lambda *_: os.kill(workers[0].pid, signal.SIGKILL)
+        tmp_path / "remote", scheduler, on_progress=lambda *_: os.kill(workers[0].pid, signal.SIGKILL)
     )
     local = sweep(tmp_path / "local")
     assert [row.status for row in remote] == ["SUCCESS"] * len(SEEDS)
@@ -252,17 +252,11 @@ def test_a_killed_worker_costs_only_time(
 
 
 @pytest.mark.slow
-def test_a_scheduler_without_workers_and_none_at_all_are_explained(tmp_path: Path) -> None:
-    scheduler = start_dask(tmp_path, "scheduler", "--host", "127.0.0.1", "--port", "0")
-    try:
-        address = wait_for(scheduler.stderr, r"Scheduler at:\s*(tcp://\S+)")
-        with pytest.raises(InputError, match="has no workers"):
-            sweep(tmp_path / "runs", address)
-    finally:
-        scheduler.kill()
-        scheduler.communicate()
+def test_a_scheduler_without_workers_and_none_at_all_are_explained(scheduler: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="has no workers"):
+        sweep(tmp_path / "runs", scheduler)
     with pytest.raises(InputError, match=r"cannot be reached: .*; start it with `dask scheduler`"):
-        sweep(tmp_path / "runs", address)
+        sweep(tmp_path / "runs", "tcp://127.0.0.1:1")
 
 
 def test_without_the_extra_the_error_names_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -74,7 +74,7 @@ def test_a_damaged_log_says_so(path: Path) -> None:
 
 
 def test_a_file_that_is_no_log_says_so(path: Path) -> None:
-    with pytest.raises(InputError, match="no such file"):
+    with pytest.raises(InputError, match="there is no file"):
         list(read_commands(path))
     path.write_bytes(b"executive world 2 joints 7\nS")
     with pytest.raises(InputError, match="is no log of a world"):

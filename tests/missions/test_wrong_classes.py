@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,10 +11,23 @@ import pytest
 from executive.cell.frame import Detection
 from executive.events import ItemChanged
 from executive.perception.camera_model import compute_calibration
-from executive.testing.fake_cell import FakeCell
+from executive.testing.fake_cell import FakeCell, load_empty_cell
 from executive.testing.run_mission import MissionResult, run_mission
 
+Answers = Callable[[int, Sequence[Detection]], Sequence[Detection]]
 OBJECTS = (("cube", 0.46, -0.12), ("sphere", 0.58, 0.0), ("cube", 0.5, 0.14), ("duck", 0.6, 0.16))
+
+
+def sort_objects(mission: str, make_answer: Answers, **cell: str) -> MissionResult:
+    """Sort `OBJECTS` with a detector that answers so."""
+
+    def arrange(fake: FakeCell) -> None:
+        fake.world.objects.clear()
+        for thing in OBJECTS:
+            fake.world.put(*thing)
+        fake.detector.make_answer = make_answer
+
+    return run_mission(mission, FakeCell, arrange=arrange, set=cell)
 
 
 def sorted_with(mission: str, labels: dict[str, str], **cell: str) -> MissionResult:
@@ -24,13 +36,7 @@ def sorted_with(mission: str, labels: dict[str, str], **cell: str) -> MissionRes
     def relabel(look: int, true: Sequence[Detection]) -> Sequence[Detection]:
         return [replace(one, label=labels.get(one.label, one.label)) for one in true]
 
-    def arrange(fake: Any) -> None:
-        fake.world.objects.clear()
-        for thing in OBJECTS:
-            fake.world.put(*thing)
-        fake.detector.make_answer = relabel
-
-    return run_mission(mission, FakeCell, arrange=arrange, set=cell)
+    return sort_objects(mission, relabel, **cell)
 
 
 @pytest.mark.parametrize("mission", ["sort_overhead", pytest.param("sort_wrist", marks=pytest.mark.slow)])
@@ -59,20 +65,14 @@ def sorted_beside_banana(
 ) -> MissionResult:
     """Sort `OBJECTS`; some looks also show a banana at (x, y) [m]."""
 
-    def arrange(fake: FakeCell) -> None:
-        def add_banana(look: int, true: Sequence[Detection]) -> Sequence[Detection]:
-            matrix, X_WC = compute_calibration(fake.config.cameras["overhead"])
-            column, row, depth = matrix @ X_WC.inverse().apply(np.array([x, y, 0.025]))
-            u, v = column / depth, row / depth
-            banana = Detection("banana", confidence, (u - 9, v - 9, u + 9, v + 9))
-            return [*true, banana] if is_shown(look) else true
+    def add_banana(look: int, true: Sequence[Detection]) -> Sequence[Detection]:
+        matrix, X_WC = compute_calibration(load_empty_cell().cameras["overhead"])
+        column, row, depth = matrix @ X_WC.inverse().apply(np.array([x, y, 0.025]))
+        u, v = column / depth, row / depth
+        banana = Detection("banana", confidence, (u - 9, v - 9, u + 9, v + 9))
+        return [*true, banana] if is_shown(look) else true
 
-        fake.world.objects.clear()
-        for thing in OBJECTS:
-            fake.world.put(*thing)
-        fake.detector.make_answer = add_banana
-
-    return run_mission("sort_overhead", FakeCell, arrange=arrange, set=cell)
+    return sort_objects("sort_overhead", add_banana, **cell)
 
 
 @pytest.mark.parametrize(

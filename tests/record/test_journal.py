@@ -165,7 +165,7 @@ def test_a_torn_end_is_left_out_and_cut_off_where_the_journal_goes_on(path, cont
 
 
 def test_a_new_run_needs_a_new_journal_and_one_that_goes_on_an_old_one(path):
-    with pytest.raises(InputError, match="cannot read"):
+    with pytest.raises(InputError, match="there is no file"):
         list(read_journal(path))
     with pytest.raises(InputError, match="cannot open the journal"):
         Journal(path, resume=True)

@@ -150,6 +150,10 @@ class SimDriver:
         body = self.tool.held_body
         return None if body is None else self.world.describe_object(body)
 
+    @property
+    def forgotten_count(self) -> int:
+        return self.world.forgotten_count
+
     def remove_object(self, true_object: TrueObject, *, is_counted: bool = True) -> None:
         self.world.remove_object(true_object.body, is_counted=is_counted)
 

@@ -64,7 +64,8 @@ class World(CellWorld):
         is_idle: True during physics steps that belong to no control step of the run.
         rest_positions: Positions `(3,)` [m] of each object by body: initial position of the run, and position
             after each move by a test and after each release by the tool.
-        removed_objects: The removed objects by body.
+        removed_objects: The removed objects by body, without the forgotten ones.
+        forgotten_count: Number of forgotten objects.
     """
 
     def __init__(self, config: CellConfig, *, gui: bool = False) -> None:
@@ -80,6 +81,7 @@ class World(CellWorld):
         """Time in the motion [s] and joint positions [rad] of the last command; empty after the next step."""
         self.rest_positions: dict[int, list[Array]] = {}
         self.removed_objects: dict[int, TrueObject] = {}
+        self.forgotten_count = 0
 
     def paint_table(self, colour: Colour, texture: str) -> None:
         """Give the table a texture of `TEXTURES`, with RGB values multiplied by `colour`."""
@@ -117,6 +119,7 @@ class World(CellWorld):
         if is_counted:
             self.removed_objects[body] = replace(self.describe_object(body), is_removed=True)
         else:
+            self.forgotten_count += 1
             self.rest_positions.pop(body, None)
         del self.labels[body]
         del self.models[body]

@@ -20,7 +20,7 @@ from executive.cell.device_config import CameraConfig
 from executive.cell.devices import DeviceClock
 from executive.cell.frame import Answer, Detection, ErrorRates, Frame, TrueFrame
 from executive.cell.objects import BIN_THICKNESS, Bin, ObjectClass
-from executive.errors import Crowded, DeadlinePassed, Unavailable
+from executive.errors import Crowded, DeadlinePassed, Interrupted, TickOverdue, Unavailable
 from executive.perception.camera_model import intersect_plane
 from executive.perception.detectors.detector_registry import (
     DetectorContext,
@@ -161,17 +161,20 @@ class CellDetector:
 
     def _check_boxes(self, detections: Sequence[Detection], frame: Frame, view: str) -> None:
         """Raise Crowded if there are too many boxes, and Unavailable if a detection is invalid."""
+        invalid = None
         count = len(detections)
+        if count <= MAX_BOXES + MAX_BOXES_IN_BINS:
+            invalid = next((found for found in detections if not _is_valid(found, frame)), None)
+        if invalid is not None:
+            box = f"{invalid.label[:MAX_LABEL_LENGTH]!r} {invalid.confidence:g} at {invalid.box}"
+            image = f"an image of {frame.visible.shape[1]} x {frame.visible.shape[0]} pixels"
+            raise Unavailable(f"detector {self.name} returned an invalid box: {box} in {image}")
         if MAX_BOXES < count <= MAX_BOXES + MAX_BOXES_IN_BINS:
             count = sum(not self._is_in_bin(detection, frame) for detection in detections)
         if count > MAX_BOXES:
             problem = f"found {count} boxes in the view {view}, which cannot all be objects"
             advice = "raise `floor` of the detector in the cell file, or use another detector"
             raise Crowded(f"detector {self.name} {problem}; at most {MAX_BOXES} are allowed: {advice}")
-        if invalid := next((found for found in detections if not _is_valid(found, frame)), None):
-            box = f"{invalid.label[:MAX_LABEL_LENGTH]!r} {invalid.confidence:g} at {invalid.box}"
-            image = f"an image of {frame.visible.shape[1]} x {frame.visible.shape[0]} pixels"
-            raise Unavailable(f"detector {self.name} returned an invalid box: {box} in {image}")
 
     def _is_in_bin(self, detection: Detection, frame: Frame) -> bool:
         """Return True if the centre of a box lies in a bin, on its floor or at the height of its walls."""
@@ -231,6 +234,8 @@ def _call_at_once(search: Callable[[], Answer]) -> Future[Answer]:
     future: Future[Answer] = Future()
     try:
         future.set_result(search())
+    except (Interrupted, TickOverdue):
+        raise
     except BaseException as error:
         future.set_exception(error)
     return future

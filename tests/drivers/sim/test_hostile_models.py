@@ -37,31 +37,27 @@ def test_a_file_that_is_no_urdf_is_an_error(content: str, error: str, tmp_path: 
         compute_mass(config)  # also if the cell file states the mass
 
 
-@pytest.mark.parametrize("mesh", ["/etc/x.obj", "../x.obj", "link.obj", "file:///etc/x.obj", "http://x.obj"])
-def test_a_mesh_outside_of_the_folder_of_its_urdf_is_not_opened(mesh: str, tmp_path: Path) -> None:
+OUTSIDE = ("/etc/x.obj", "../x.obj", "link.obj", "file:///etc/x.obj", "http://x.obj")
+
+
+@pytest.mark.parametrize(
+    ("part", "mesh", "error"),
+    [
+        *(("visual", mesh, f'names the file "{mesh}", which is outside of its folder; copy') for mesh in OUTSIDE),
+        *((part, "pipe.obj", r"^there is no model .*pipe\.obj, neither beside the cell file nor")
+          for part in ("visual", "collision")),
+        ("collision", "m.obj", r"^the model m\.obj has more than 20000 triangles; simplify the mesh$"),
+    ],
+)  # fmt: skip
+def test_a_mesh_that_is_elsewhere_or_no_file_or_large_is_refused(
+    part: str, mesh: str, error: str, tmp_path: Path
+) -> None:
     (tmp_path / "link.obj").symlink_to("/etc/passwd")
-    visual = f"<visual><geometry><mesh filename='{mesh}'/></geometry></visual>"
-    (tmp_path / "m.urdf").write_text(f"<robot>{visual}</robot>")
-    with pytest.raises(InputError, match=rf'names the file "{mesh}", which is outside of its folder; copy'):
-        load_mesh(ObjectConfig(urdf=str(tmp_path / "m.urdf"), height=0.05, radius=0.03))
-
-
-@pytest.mark.parametrize("part", ["visual", "collision"])
-def test_a_mesh_that_is_no_file_is_not_opened(part: str, tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.obj")
-    shape = f"<{part}><geometry><mesh filename='pipe.obj'/></geometry></{part}>"
-    (tmp_path / "m.urdf").write_text(f"<robot>{shape}</robot>")
-    with pytest.raises(InputError, match=r"^there is no model .*pipe\.obj, neither beside the cell file nor"):
-        compute_mass(ObjectConfig(urdf=str(tmp_path / "m.urdf"), height=0.05, radius=0.03))
-
-
-def test_a_mesh_of_more_than_20000_triangles_is_refused(tmp_path: Path) -> None:
     (tmp_path / "m.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\n" + "f 1 2 3\n" * 20_001)
-    shape = "<collision><geometry><mesh filename='m.obj'/></geometry></collision>"
+    shape = f"<{part}><geometry><mesh filename='{mesh}'/></geometry></{part}>"
     (tmp_path / "m.urdf").write_text(f"<robot>{shape}</robot>")
-    with pytest.raises(
-        InputError, match=r"^the model m\.obj has more than 20000 triangles; simplify the mesh$"
-    ):
+    with pytest.raises(InputError, match=error):
         load_mesh(ObjectConfig(urdf=str(tmp_path / "m.urdf"), height=0.05, radius=0.03))
 
 

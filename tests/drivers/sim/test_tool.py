@@ -72,8 +72,9 @@ class Bench:
 
 
 @pytest.fixture
-def bench() -> Iterator[Bench]:
-    bench = Bench("cube")
+def bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
+    """A tool over a cube, or over an object of the class that the param names."""
+    bench = Bench(getattr(request, "param", "cube"))
     yield bench
     bench.world.close()
 
@@ -87,9 +88,8 @@ def test_a_vacuum_already_on_seals_on_what_comes_within_reach(bench: Bench) -> N
     assert bench.tool.holding
 
 
-@pytest.mark.parametrize("label", ["cube", "sphere", "duck"])
-def test_a_held_object_keeps_the_pose_it_had_at_contact_and_pulls_with_its_weight(label: str) -> None:
-    bench = Bench(label)
+@pytest.mark.parametrize("bench", ["cube", "sphere", "duck"], indirect=True)
+def test_a_held_object_keeps_the_pose_it_had_at_contact_and_pulls_with_its_weight(bench: Bench) -> None:
     bench.put(0.0012)
     before = bench.pose_in_tool()
     bench.tool.close()
@@ -100,7 +100,6 @@ def test_a_held_object_keeps_the_pose_it_had_at_contact_and_pulls_with_its_weigh
     assert after.position == pytest.approx(before.position, abs=2e-4)
     assert after.rotation == pytest.approx(before.rotation, abs=5e-3)
     assert bench.tool.pull == pytest.approx(0.1 * 9.81, rel=0.05)
-    bench.world.close()
 
 
 def test_the_gauge_tells_what_the_seal_bears_until_nothing_is_held(bench: Bench) -> None:
@@ -143,8 +142,7 @@ def test_opening_drops_the_object_and_lets_it_collide_with_the_tool_again(bench:
     assert bench.world.client.getContactPoints(bench.world.arm, bench.body)
 
 
-def test_the_load_of_a_hanging_object_is_its_weight_and_noise_of_the_declared_size() -> None:
-    bench = Bench("cube")
+def test_the_load_of_a_hanging_object_is_its_weight_and_noise_of_the_declared_size(bench: Bench) -> None:
     first = bench.tool.load
     assert first == pytest.approx(0.0, abs=5 * bench.tool.load_std)
     assert bench.tool.load == first != bench.config.build_sim(bench.world, noise_seed=1).load
@@ -156,4 +154,3 @@ def test_the_load_of_a_hanging_object_is_its_weight_and_noise_of_the_declared_si
     mass = bench.world.client.getDynamicsInfo(bench.body, -1)[0]
     assert np.mean(loads) == pytest.approx(mass * GRAVITY, abs=4 * bench.tool.load_std / 300**0.5)
     assert np.std(loads) == pytest.approx(bench.tool.load_std, rel=0.15)
-    bench.world.close()

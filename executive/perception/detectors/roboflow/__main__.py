@@ -131,7 +131,11 @@ def _bound_responses(url: str) -> None:
             raise ValueError(f"a redirect to {request.url}, another server")
         request.headers["Accept-Encoding"] = "gzip"
         response = send(adapter, request, **{**options, "stream": True})
-        response.raw = io.BytesIO(_read_body(response.raw))
+        try:
+            body = _read_body(response.raw)
+        finally:
+            response.close()
+        response.raw = io.BytesIO(body)
         response.encoding = "utf-8"  # The encoding of JSON; the detection of another one would take long.
         return response
 
