@@ -238,7 +238,7 @@ class ResultsDatabase:
 
     def __init__(self, path: Path, settings: SweepSettings | None = None) -> None:
         self.path = path
-        self._lock_descriptor: int | None = None
+        self._resources = contextlib.ExitStack()
         if settings is None and not (path.is_file() and path.stat().st_size <= MAX_FILE_SIZE):
             raise InputError(
                 f'there is no file "{path}", or it has more than {MAX_FILE_SIZE // 1_000_000} MB; '
@@ -246,7 +246,8 @@ class ResultsDatabase:
             )
         schema = SCHEMA_PATH.read_text(encoding="utf-8")
         with self._convert_errors():
-            self._connection = sqlite3.connect(path, timeout=BUSY_TIMEOUT)
+            connection = sqlite3.connect(path, timeout=BUSY_TIMEOUT)
+            self._connection = self._resources.enter_context(contextlib.closing(connection))
             self._connection.row_factory = sqlite3.Row
             if settings is not None:
                 with self._connection as connection:
@@ -274,9 +275,10 @@ class ResultsDatabase:
         Raises:
             InputError: Another process has reserved the sweep.
         """
-        self._lock_descriptor = os.open(self.path.parent, os.O_RDONLY)
+        descriptor = os.open(self.path.parent, os.O_RDONLY)
+        self._resources.callback(os.close, descriptor)
         try:
-            fcntl.flock(self._lock_descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
             raise InputError(
                 f'another process executes the sweep "{self.path}"; '
@@ -326,10 +328,7 @@ class ResultsDatabase:
 
     def close(self) -> None:
         """Close the file."""
-        self._connection.close()
-        if self._lock_descriptor is not None:
-            os.close(self._lock_descriptor)
-            self._lock_descriptor = None
+        self._resources.close()
 
     def _insert(self, table: str, columns: Mapping[str, Any]) -> None:
         placeholders = ", ".join("?" * len(columns))
