@@ -291,20 +291,14 @@ def describe_unmet_conditions(conditions: Sequence[Condition], sweep: SweepResul
 
 
 def write_junit(path: Path, sweep: SweepResults) -> None:
-    """Write the JUnit report of a sweep.
+    """Write the JUnit report: one test case per run, with the reason of a failure and a command to repeat it.
+
+    A run with the status FAULT is an error. A run with the status FAILURE or INCOMPLETE is a failure, and so
+    is a successful run whose audit contradicts the ledger.
 
     Raises:
         InputError: The file cannot be written.
     """
     advice = "name another file with --junit FILE"
     with explain_os_errors(InputError, f'cannot write the report "{path}"', advice):
-        write_atomically(path, format_junit(sweep))
-
-
-def format_junit(sweep: SweepResults) -> str:
-    """Return the report: one test case per run, with the reason of a failure and a command to repeat the run.
-
-    A run with the status FAULT is an error. A run with the status FAILURE or INCOMPLETE is a failure, and so
-    is a successful run whose audit contradicts the ledger.
-    """
-    return f"{render_template('junit.xml', sweep=sweep)}\n"
+        write_atomically(path, f"{render_template('junit.xml', sweep=sweep)}\n")

@@ -22,7 +22,7 @@ from executive.campaign.results import (
     make_record,
 )
 from executive.campaign.sweep import make_settings, open_sweep
-from executive.campaign.sweep_reports import describe_unmet_conditions, format_junit, parse_requirement
+from executive.campaign.sweep_reports import describe_unmet_conditions, parse_requirement, write_junit
 from executive.campaign.sweep_summary import (
     Estimate,
     FailureGroup,
@@ -325,14 +325,15 @@ def test_another_text_is_refused_with_the_allowed_names(text: str, message: str)
         parse_requirement(text)
 
 
-def test_each_run_is_a_test_case_of_the_junit_report() -> None:
+def test_each_run_is_a_test_case_of_the_junit_report(tmp_path: Path) -> None:
     runs = [
         make_run(0),
         make_run(1, "FAILURE", message="no <seal> \x1b on “cube-1”", node="tree/Grasp"),
         make_run(2, "FAULT", reason="fault", message="it broke"),
         make_run(3, audit=Audit(agrees=False, wrong_bin=1), variant={"speed": "1"}),
     ]
-    root = ElementTree.fromstring(format_junit(make_results(*runs)).encode())
+    write_junit(tmp_path / "junit.xml", make_results(*runs))
+    root = ElementTree.parse(tmp_path / "junit.xml").getroot()
     (suite,) = root
     assert (root.tag, suite.tag, suite.get("name")) == ("testsuites", "testsuite", "executive sweep sort")
     assert [suite.get(name) for name in ("tests", "failures", "errors", "time")] == ["4", "2", "1", "10.000"]
