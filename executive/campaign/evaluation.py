@@ -284,9 +284,6 @@ def list_metrics(source: str, detector: str, evaluation: Evaluation) -> Iterator
         yield f"  unavailable for {images_text}, last reason: {evaluation.why}"
     if not evaluation.answered_by:
         return
-    if set(evaluation.answered_by) != {detector}:
-        counts = (f"{name} ({count})" for name, count in evaluation.answered_by.items())
-        yield f"  answered by {', '.join(counts)}"
     yield (
         f"  precision {evaluation.precision:.2%}, recall {evaluation.recall:.2%}, "
         f"mAP50 {evaluation.map50:.4f}, mAP50-95 {evaluation.map50_95:.4f}"
