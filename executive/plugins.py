@@ -12,7 +12,7 @@ import re
 import stat
 import sys
 import traceback
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import metadata
 from importlib.metadata import EntryPoint, entry_points
@@ -87,7 +87,19 @@ def list_entries(group: str, noun: str) -> dict[str, PluginEntry]:
         InputError: Two packages register the same name, or the pyproject.toml of the project is invalid.
     """
     project = find_project()
-    entries = (*_list_installed_entries(group, noun, project), *_enable_project_entries(group, noun, project))
+    project_name = canonicalize_name(project.name) if project else None
+    entries = [
+        PluginEntry(name, value, noun, f"uninstall the package {package}")
+        for name, value, package in _read_installed_entries(group, tuple(sys.path))
+        if canonicalize_name(package) != project_name
+    ]
+    if project and (project_entries := project.read_entries(group)):
+        folder = str(project.file.parent)
+        if folder not in sys.path:
+            # The folder is the last entry of the path, so that its modules do not shadow installed modules.
+            sys.path.append(folder)
+        remedy = f"remove it from {project.file}"
+        entries += [PluginEntry(name, value, noun, remedy) for name, value in project_entries.items()]
     entry_by_name: dict[str, PluginEntry] = {}
     for entry in sorted(entries, key=lambda entry: (entry.name, entry.value)):
         first_entry = entry_by_name.setdefault(entry.name, entry)
@@ -97,13 +109,6 @@ def list_entries(group: str, noun: str) -> dict[str, PluginEntry]:
                 f"{entry.value}; uninstall or rename one of them"
             )
     return entry_by_name
-
-
-def _list_installed_entries(group: str, noun: str, project: Project | None) -> Iterator[PluginEntry]:
-    """Yield the entries of all installed packages except the project itself."""
-    for name, value, package in _read_installed_entries(group, tuple(sys.path)):
-        if project is None or canonicalize_name(package) != canonicalize_name(project.name):
-            yield PluginEntry(name, value, noun, f"uninstall the package {package}")
 
 
 @functools.cache
@@ -119,18 +124,6 @@ def _read_installed_entries(group: str, search_path: tuple[str, ...]) -> tuple[t
         (entry.name, entry.value, packages[entry.dist] if entry.dist else entry.module.partition(".")[0])
         for entry in entries
     )
-
-
-def _enable_project_entries(group: str, noun: str, project: Project | None) -> Iterator[PluginEntry]:
-    """Append the folder of the project to `sys.path`, and yield the entries of the project."""
-    if project is None or not (entries := project.read_entries(group)):
-        return
-    folder = str(project.file.parent)
-    if folder not in sys.path:
-        # The folder is the last entry of the path, so that its modules do not shadow installed modules.
-        sys.path.append(folder)
-    for name, value in entries.items():
-        yield PluginEntry(name, value, noun, f"remove it from {project.file}")
 
 
 def _locate_error(error: BaseException) -> str:
