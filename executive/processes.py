@@ -63,6 +63,7 @@ class WorkerPool(ProcessPoolExecutor):
     def kill(self) -> None:
         """Kill the processes of the pool; the pool is unusable afterwards."""
         for process in list((self._processes or {}).values()):
+            # A run would handle SIGTERM as a halt, and the process would not end.
             process.kill()
 
     def __exit__(
@@ -72,13 +73,6 @@ class WorkerPool(ProcessPoolExecutor):
         if error is not None:
             self.kill()
         return super().__exit__(cls, error, traceback)
-
-
-def kill_workers() -> None:
-    """Kill all processes that `multiprocessing` started; their pools are unusable afterwards."""
-    for process in multiprocessing.active_children():
-        # A run would handle SIGTERM as a halt, and the process would not end.
-        process.kill()
 
 
 def _initialize_worker() -> None:

@@ -22,7 +22,7 @@ from executive.behaviours import load_skills
 from executive.campaign.results import ENVIRONMENT_REASON, RunRecord, RunRow, SweepSettings, make_record
 from executive.errors import InputError, describe_error
 from executive.mission.load import LoadedMission, load_mission
-from executive.processes import WorkerPool, kill_workers
+from executive.processes import WorkerPool
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.timeline import Timeline
 from executive.run.assembly import RunOptions
@@ -160,7 +160,8 @@ def run_jobs(
                 if signal_event.is_set():
                     signal_event.clear()
                     if is_halted:
-                        kill_workers()
+                        for _, pool in running_jobs.values():
+                            pool.kill()
                         raise KeyboardInterrupt
                     is_halted = True
                     pending_indices.clear()
