@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import heapq
 import math
 import time
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -256,9 +257,8 @@ def collect_mistakes(
     mistakes: list[Mistake], matches: Sequence[BoxMatch], sample: LabelledImage, max_count: int = 24
 ) -> None:
     """Add the mistakes in one image to `mistakes`, and keep the most severe `max_count`, sorted."""
-    mistakes += find_mistakes(matches, sample)
-    mistakes.sort(key=lambda mistake: -mistake.severity)
-    del mistakes[max_count:]
+    candidates = (*mistakes, *find_mistakes(matches, sample))
+    mistakes[:] = heapq.nlargest(max_count, candidates, key=lambda mistake: mistake.severity)
 
 
 def find_mistakes(matches: Sequence[BoxMatch], sample: LabelledImage) -> Iterator[Mistake]:

@@ -249,11 +249,9 @@ class SceneRenderer:
         rendered = render(world, matrix, X_WC, region, light)
         scale = IMAGE_SIZE / (region[2] - region[0])
         labelled = self._label_image(rendered, MIN_CONTRAST * noise.read, objects_by_body, region[:2], scale)
-        if labelled is None:
-            return None
         image = add_noise(rendered.image, noise, rng)
         resized_image = cv2.resize(image, (IMAGE_SIZE, IMAGE_SIZE), interpolation=cv2.INTER_AREA)
-        return replace(labelled, image=np.asarray(resized_image, np.uint8))
+        return labelled and replace(labelled, image=np.asarray(resized_image, np.uint8))
 
     def _render_initial(self, scene: SceneConfig, rng: np.random.Generator) -> LabelledImage | None:
         """Return the image of an initial scene, or None if too many objects are heavily occluded."""
