@@ -117,9 +117,8 @@ def run_mission(
     events: list[TimedEvent] = []
     injector = FaultInjector(faults, timeout)
     options = RunOptions(seed, requests, make_cell=injector.wrap(make_cell), substitutes=substitutes or {})
-    run = assemble(loaded, options, [events.append, *observers])
-    station = run.station
-    try:
+    with closing(assemble(loaded, options, [events.append, *observers])) as run:
+        station = run.station
         if arrange is not None:
             arrange(station)
         injector.check_patterns([getattr(node, "path", node.name) for node in run.root.iterate()])
@@ -135,8 +134,6 @@ def run_mission(
             audit=station.audit(),
             cell=station,
         )
-    finally:
-        run.close()
 
 
 def _check_substitutes(run: Run, skills: Mapping[str, type[Skill]]) -> None:
