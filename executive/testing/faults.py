@@ -69,26 +69,27 @@ def after(start: float, effect: Effect) -> ScheduledFault:
 
 def grip_fails() -> Effect:
     """Return an effect: the tool cannot grip, and `Grasp` fails with `missed`; held objects stay held."""
-    return Effect("grip_fails", interceptors={"tool.close": _return_constant}, arguments=(None,))
+    return _make_constant_effect("grip_fails", "tool.close", None)
 
 
 def workspace_occluded() -> Effect:
     """Return an effect: the camera does not see the whole table, and `Detect` fails with `hidden`."""
-    return Effect(
-        "workspace_occluded", interceptors={"camera.sees_table": _return_constant}, arguments=(False,)
-    )
+    return _make_constant_effect("workspace_occluded", "camera.sees_table", False)
 
 
 def operator_quits() -> Effect:
     """Return an effect: the operator quits, and `AwaitRequest` fails with `quit`."""
-    return Effect("operator_quits", interceptors={"operator.ask": _return_constant}, arguments=(None,))
+    return _make_constant_effect("operator_quits", "operator.ask", None)
 
 
 def operator_asks_rescan() -> Effect:
     """Return an effect: the operator requests a new scan, and `AwaitRequest` fails with `rescan`."""
-    return Effect(
-        "operator_asks_rescan", interceptors={"operator.ask": _return_constant}, arguments=("rescan",)
-    )
+    return _make_constant_effect("operator_asks_rescan", "operator.ask", "rescan")
+
+
+def _make_constant_effect(name: str, path: str, result: object) -> Effect:
+    """Return an effect: the method with this path is not called, and its result is `result`."""
+    return Effect(name, interceptors={path: _return_constant}, arguments=(result,))
 
 
 def _return_constant(proceed: Callable[[], object], occurrence: Occurrence, answer: object) -> object:
