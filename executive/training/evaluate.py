@@ -91,16 +91,14 @@ def evaluate(
     average_precision = AveragePrecision()
     statistics_of_frames: list[Mapping[str, float]] = []
     latencies: list[float] = []
-    unavailable_count = 0
-    unavailable_reason = ""
+    unavailable_reasons: list[str] = []
     min_confidence = detector.threshold if threshold is None else threshold
     for number, sample in enumerate(samples, 1):
         frame = sample.to_frame(number)
         try:
             detections, latency = detector.detect(frame)
         except Unavailable as error:
-            unavailable_count += 1
-            unavailable_reason = str(error) or repr(error)
+            unavailable_reasons.append(str(error) or repr(error))
             continue
         latencies.append(latency)
         average_precision.add([entry for entry in detections if not is_ignored(entry, sample)], sample)
@@ -119,7 +117,7 @@ def evaluate(
     metrics_by_class = {label: errors.compute_metrics([label]) for label in errors.labels}
     return Evaluation(
         threshold=min_confidence,
-        images=unavailable_count + len(latencies),
+        images=len(unavailable_reasons) + len(latencies),
         **vars(errors.compute_metrics(errors.labels)),
         map50=map50,
         map50_95=map50_95,
@@ -130,8 +128,8 @@ def evaluate(
         latency=Distribution.compute(latencies[1:] or latencies),
         by_class={label: metrics for label, metrics in metrics_by_class.items() if metrics.objects},
         confusion=errors.make_confusion_matrix(),
-        unavailable=unavailable_count,
-        why=unavailable_reason,
+        unavailable=len(unavailable_reasons),
+        why=unavailable_reasons[-1] if unavailable_reasons else "",
         answered_by={detector.name: len(latencies)} if latencies else {},
         by_count={count: dict(counts) for count, counts in errors.counts_by_object_count.items()},
         reliability=errors.estimate_error_rates(),

@@ -57,8 +57,7 @@ class Distribution:
         """Return the distribution of `values`, or None if there are no values."""
         if not len(values):
             return None
-        median, p95, p99, worst = np.percentile(values, [50, 95, 99, 100])
-        return Distribution(float(median), float(p95), float(p99), float(worst))
+        return Distribution(*np.percentile(values, [50, 95, 99, 100]).tolist())
 
 
 @dataclass(frozen=True)
