@@ -141,12 +141,10 @@ class _CellFileReader:
         base = self._read_base(reference, (*previous_files, path))
         if base is None:
             return None
-        entries = [entry for entry in root.entries if entry.key.text != BASE_KEY]
-        base_detectors = base.get(DETECTORS_KEY)
-        for index, entry in enumerate(entries):
-            if entry.key.text == DETECTORS_KEY:
-                entries[index] = replace(entry, value=_merge_sections(entry.value, base_detectors))
-        return _inherit_entries(replace(root, entries=tuple(entries)), base)
+        root = _omit_entry(root, BASE_KEY)
+        if detectors := root.get(DETECTORS_KEY):
+            root = root.with_value(DETECTORS_KEY, _merge_sections(detectors, base.get(DETECTORS_KEY)))
+        return _inherit_entries(root, base)
 
     def _read_base(self, reference: YamlScalar, files: tuple[Path, ...]) -> YamlMapping | None:
         """Return the YAML tree of the base of `files[-1]`, or None if the base cannot be read."""
@@ -175,7 +173,7 @@ class _CellFileReader:
         arm = root.get("arm") if isinstance(root, YamlMapping) else None
         if not isinstance(root, YamlMapping) or not isinstance(arm, YamlMapping):
             return root
-        is_default = "file" not in arm.keys
+        is_default = "file" not in arm.entries
         file = YamlScalar(arm.span, DEFAULT_ARM_FILE, DEFAULT_ARM_FILE) if is_default else arm.get("file")
         if not isinstance(file, YamlScalar):
             return root  # Validation reports the wrong type.
@@ -193,12 +191,8 @@ class _CellFileReader:
             message = f'an arm other than {arm_file.arm} needs the key "file" with the path of an arm file'
             self.findings.append(make_error(urdf.span, "no-arm", message))
             return None
-        if is_default:
-            given = tuple(entry for entry in arm_root.entries if entry.key.text != "limits")
-            arm_root = replace(arm_root, entries=given)
-        complete_arm = _merge_sections(arm, arm_root)
-        entries = (replace(one, value=complete_arm) if one.value is arm else one for one in root.entries)
-        return replace(root, entries=tuple(entries))
+        completing_root = _omit_entry(arm_root, "limits") if is_default else arm_root
+        return root.with_value("arm", _merge_sections(arm, completing_root))
 
     def arrange_matrices(self, node: YamlNode, keys: KeyPath = ()) -> YamlNode:
         """Return a tree whose calibrations contain the entries of files, and each matrix as one list.
@@ -210,11 +204,11 @@ class _CellFileReader:
             return _flatten(node) if is_calibration else node
         if is_calibration and (data := node.get("data")):
             return _flatten(data)
-        entries = []
         # Only the calibration itself, and none of its parts, can name a file.
-        for entry in self._insert_file(node).entries if is_calibration and len(keys) == 3 else node.entries:
-            entries.append(replace(entry, value=self.arrange_matrices(entry.value, (*keys, entry.key.text))))
-        return replace(node, entries=tuple(entries))
+        entries = dict(self._insert_file(node).entries if is_calibration and len(keys) == 3 else node.entries)
+        for key, entry in entries.items():
+            entries[key] = replace(entry, value=self.arrange_matrices(entry.value, (*keys, key)))
+        return replace(node, entries=entries)
 
     def _read_named_file(self, file: YamlScalar, shipped_subfolder: str, code: str) -> Source | None:
         """Return the text of the file that a value names, or None after an error with this code."""
@@ -242,12 +236,9 @@ class _CellFileReader:
         text = text.rstrip().removesuffix("---")
         root, findings = parse_yaml(source, text)
         self.findings += findings
-        entries = [
-            replace(entry, key=replace(entry.key, text=CALIBRATION_KEYS[entry.key.text]))
-            for entry in (root.entries if isinstance(root, YamlMapping) else ())
-            if entry.key.text in CALIBRATION_KEYS
-        ]
-        return _inherit_entries(calibration, replace(calibration, entries=tuple(entries)))
+        entries = root.entries if isinstance(root, YamlMapping) else {}
+        known = {CALIBRATION_KEYS[key]: entries[key] for key in entries if key in CALIBRATION_KEYS}
+        return _inherit_entries(calibration, replace(calibration, entries=known))
 
 
 def _flatten(node: YamlNode) -> YamlNode:
@@ -262,12 +253,14 @@ def _merge_sections(sections: YamlNode, base: YamlNode | None) -> YamlNode:
     """
     if not isinstance(sections, YamlMapping) or not isinstance(base, YamlMapping):
         return sections
-    entries = []
-    for entry in sections.entries:
-        base_section = base.get(entry.key.text)
-        if base_section is None or entry.value.python_value is not None:
-            entries.append(replace(entry, value=_merge_section(entry.value, base_section)))
-    return _inherit_entries(replace(sections, entries=tuple(entries)), base, sections.keys)
+    entries = {**sections.entries, **base.entries}
+    for key, entry in sections.entries.items():
+        base_section = base.get(key)
+        if base_section is not None and entry.value.python_value is None:
+            del entries[key]
+        else:
+            entries[key] = replace(entry, value=_merge_section(entry.value, base_section))
+    return replace(sections, entries=entries)
 
 
 def _merge_section(section: YamlNode, base: YamlNode | None) -> YamlNode:
@@ -280,11 +273,15 @@ def _merge_section(section: YamlNode, base: YamlNode | None) -> YamlNode:
     return _inherit_entries(section, base) if is_same_kind else section
 
 
-def _inherit_entries(mapping: YamlMapping, base: YamlMapping, excluded: tuple[str, ...] = ()) -> YamlMapping:
-    """Return a mapping, completed by entries of the base except those with a key in `excluded`."""
-    keys = {*mapping.keys, *excluded}
-    base_entries = (entry for entry in base.entries if entry.key.text not in keys)
-    return replace(mapping, entries=(*mapping.entries, *base_entries))
+def _omit_entry(mapping: YamlMapping, omitted_key: str) -> YamlMapping:
+    """Return a mapping without the entry of a key."""
+    entries = {key: entry for key, entry in mapping.entries.items() if key != omitted_key}
+    return replace(mapping, entries=entries)
+
+
+def _inherit_entries(mapping: YamlMapping, base: YamlMapping) -> YamlMapping:
+    """Return a mapping, completed by the entries of the base, behind its own entries."""
+    return replace(mapping, entries={**mapping.entries, **base.entries, **mapping.entries})
 
 
 def _find_unknown_poses(file: CellFile, config: CellConfig) -> Iterator[Finding]:

@@ -187,15 +187,15 @@ class MappingReader:
         self.owner = owner
         self.span = span
         self.findings = findings
-        self._mapping = node if isinstance(node, YamlMapping) else YamlMapping(node.span, ())
+        self._mapping = node if isinstance(node, YamlMapping) else YamlMapping(node.span, {})
         if not isinstance(node, YamlMapping):
             message = f"{owner} must be a mapping, not {node.description}"
             self.add_error(node.span, "wrong-type", message, f"Its keys: {', '.join(keys)}.")
             return
-        for entry in self._mapping.entries:
-            if entry.key.text not in keys:
-                hint = suggest_choice(entry.key.text, keys, "Allowed keys")
-                self.add_error(entry.key.span, "unknown-key", f'{owner} has no key "{entry.key.text}"', hint)
+        for name, entry in self._mapping.entries.items():
+            if name not in keys:
+                hint = suggest_choice(name, keys, "Allowed keys")
+                self.add_error(entry.key.span, "unknown-key", f'{owner} has no key "{name}"', hint)
         for name, key in keys.items():
             if key.is_required() and self.get(name) is None:
                 self.add_error(span, "missing-key", f'{owner} needs the key "{name}"')
@@ -206,7 +206,7 @@ class MappingReader:
 
     def get_key_span(self, key: str) -> Span:
         """Return the position of `key`, or of the owner if the key is missing."""
-        entry = self._mapping.get_entry(key)
+        entry = self._mapping.entries.get(key)
         return entry.key.span if entry else self.span
 
     def get_value_span(self, key: str) -> Span:
@@ -259,8 +259,8 @@ class MappingReader:
         """Yield name and value of each entry below `key`."""
         node = self.get(key)
         if isinstance(node, YamlMapping):
-            for entry in node.entries:
-                yield LocatedName(entry.key.text, entry.key.span), entry.value
+            for name, entry in node.entries.items():
+                yield LocatedName(name, entry.key.span), entry.value
         elif node is not None and not is_empty(node):
             message = f"{self._describe_key(key)} must be a mapping, not {node.description}"
             self.add_error(node.span, "wrong-type", message)
@@ -296,8 +296,8 @@ def read_settings(
         hint = f"Write {owner}: {{{example_key}: {node.text}}}." if isinstance(node, YamlScalar) else ""
         findings.append(make_error(node.span, "wrong-type", message, hint))
         return {}
-    entries = ((LocatedName(entry.key.text, entry.key.span), entry.value) for entry in node.entries)
-    return {name: read_value(value, findings) for name, value in entries}
+    entries = node.entries.items()
+    return {LocatedName(key, entry.key.span): read_value(entry.value, findings) for key, entry in entries}
 
 
 def read_value(node: YamlNode, findings: list[Finding]) -> Value:

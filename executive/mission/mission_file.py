@@ -271,7 +271,7 @@ def _read_subtrees(reader: MappingReader, parser: NodeParser, library: str = "")
     subtrees: dict[str, Subtree] = {}
     for name, node in reader.iterate_entries("trees"):
         reader.check_name(name, "a subtree")
-        if isinstance(node, YamlMapping) and set(SubtreeKeys.get_keys()) & set(node.keys):
+        if isinstance(node, YamlMapping) and SubtreeKeys.get_keys().keys() & node.entries.keys():
             subtrees[name] = _parse_subtree(name, node, parser, library)
         else:
             subtrees[name] = Subtree(name, "", {}, None, parser.read_node(node, name.span), library)

@@ -103,7 +103,7 @@ class NodeParser:
     def _read_mapping(self, mapping: YamlMapping) -> Node:
         """Return the node of a mapping, which has one entry with a keyword or skill, and sibling entries."""
         label = self._read_label(mapping)
-        entries = [entry for entry in mapping.entries if entry.key.text != "as"]
+        entries = [entry for key, entry in mapping.entries.items() if key != "as"]
         # A node is a keyword, or a word that is written like the name of a skill.
         node_entries = [
             entry
@@ -232,16 +232,16 @@ class NodeParser:
         keyword = entry.key.text
         span = entry.key.span
         sibling_keys = node_class.sibling_keys
-        siblings = tuple(sibling for sibling in mapping.entries if sibling.key.text in sibling_keys)
+        siblings = {key: sibling for key, sibling in mapping.entries.items() if key in sibling_keys}
         values = {
             **self._read_inner_keys(keyword, span, entry.value, node_class),
             **self._read_keys(keyword, span, replace(mapping, entries=siblings), sibling_keys),
         }
         any_of = node_class.any_of
-        inner_keys = entry.value.keys if isinstance(entry.value, YamlMapping) else ()
+        inner_keys = entry.value.entries if isinstance(entry.value, YamlMapping) else ()
         # `MappingReader` reports a value that is not a mapping although it must be one.
         is_form_valid = isinstance(entry.value, YamlMapping) or node_class.shorthand_key is not None
-        if any_of and is_form_valid and not {*mapping.keys, *inner_keys} & {*any_of}:
+        if any_of and is_form_valid and not {*mapping.entries, *inner_keys} & {*any_of}:
             level = f" at the level of {keyword}" if set(any_of) <= set(sibling_keys) else ""
             alternatives = " or ".join(f'"{name}"' for name in any_of)
             self.add_error(span, "missing-key", f"{keyword} needs {alternatives}{level}")
@@ -264,7 +264,7 @@ class NodeParser:
         reads_inner_keys = isinstance(yaml_node, YamlMapping) or is_scalar_for_list
         if shorthand_key is not None and not (reads_inner_keys and inner_keys):
             key_node = YamlScalar(span, name, shorthand_key.name)
-            yaml_node = YamlMapping(span, (YamlEntry(key_node, yaml_node),))
+            yaml_node = YamlMapping(span, {shorthand_key.name: YamlEntry(key_node, yaml_node)})
             inner_keys = {shorthand_key.name: shorthand_key}
         return self._read_keys(name, span, yaml_node, inner_keys)
 

@@ -76,17 +76,14 @@ def _replace_value(root: YamlNode, path: list[str], value: YamlNode, findings: l
         message = f'there is no key "{key}", because the value of the section above is no mapping'
         findings.append(make_error(value.span, "unknown-key", message))
         return root
-    entry = root.get_entry(key)
-    if entry is None:
-        # The file omits the key and uses the default; validation reports an unknown key.
-        entry = YamlEntry(YamlScalar(value.span, key, key), YamlMapping(value.span, ()))
-        root = replace(root, entries=(*root.entries, entry))
+    # If the file omits the key, it uses the default; validation reports an unknown key.
+    missing_entry = YamlEntry(YamlScalar(value.span, key, key), YamlMapping(value.span, {}))
+    entry = root.entries.get(key, missing_entry)
     if inner_path:
         new_entry = YamlEntry(entry.key, _replace_value(entry.value, inner_path, value, findings))
     else:
         new_entry = YamlEntry(replace(entry.key, span=value.span), value)
-    entries = [new_entry if candidate is entry else candidate for candidate in root.entries]
-    return replace(root, entries=tuple(entries))
+    return replace(root, entries={**root.entries, key: new_entry})
 
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
@@ -128,7 +125,7 @@ def find_span(root: YamlNode, path: KeyPath, at_key: bool = False) -> Span:
     node = root
     span = root.span
     for key in path:
-        if isinstance(node, YamlMapping) and (entry := node.get_entry(str(key))):
+        if isinstance(node, YamlMapping) and (entry := node.entries.get(str(key))):
             node = entry.value
             span = node.span if isinstance(node, YamlScalar) and not at_key else entry.key.span
         elif isinstance(node, YamlSequence) and isinstance(key, int) and key < len(node.items):

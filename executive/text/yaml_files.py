@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import yaml
@@ -94,28 +94,23 @@ class YamlEntry:
 
 @dataclass(frozen=True)
 class YamlMapping(_Node):
-    """Entries with unique keys, in the order of the text."""
+    """Entries by their keys, in the order of the text."""
 
-    entries: tuple[YamlEntry, ...]
+    entries: Mapping[str, YamlEntry]
 
     @property
     def python_value(self) -> JsonValue:
         """The values by key."""
-        return {entry.key.text: entry.value.python_value for entry in self.entries}
-
-    def get_entry(self, key: str) -> YamlEntry | None:
-        """Return the entry of `key`, or None."""
-        return next((entry for entry in self.entries if entry.key.text == key), None)
+        return {key: entry.value.python_value for key, entry in self.entries.items()}
 
     def get(self, key: str) -> YamlNode | None:
         """Return the value of `key`, or None."""
-        entry = self.get_entry(key)
+        entry = self.entries.get(key)
         return entry.value if entry else None
 
-    @property
-    def keys(self) -> tuple[str, ...]:
-        """The keys in the order of the text."""
-        return tuple(entry.key.text for entry in self.entries)
+    def with_value(self, key: str, value: YamlNode) -> YamlMapping:
+        """Return the mapping with another value of an existing key."""
+        return replace(self, entries={**self.entries, key: replace(self.entries[key], value=value)})
 
 
 YamlNode = YamlScalar | YamlSequence | YamlMapping
@@ -131,7 +126,7 @@ def list_scalars(node: YamlNode) -> list[YamlScalar]:
 def list_children(node: YamlNode) -> tuple[YamlNode, ...]:
     """Return the items of a sequence, or the values of a mapping; () for a scalar."""
     if isinstance(node, YamlMapping):
-        return tuple(entry.value for entry in node.entries)
+        return tuple(entry.value for entry in node.entries.values())
     return node.items if isinstance(node, YamlSequence) else ()
 
 
@@ -268,7 +263,7 @@ class _Composer:
                 self._add_error(key.span, "duplicate-key", message)
             else:
                 entries[key.text] = YamlEntry(key, value)
-        return YamlMapping(self._make_span(event, 1), tuple(entries.values()))
+        return YamlMapping(self._make_span(event, 1), entries)
 
     def _make_span(self, event: yaml.Event, length: int = 0) -> Span:
         """Return the span of an event; if `length` is 0, the span covers the first line of the event."""
