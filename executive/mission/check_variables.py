@@ -43,13 +43,11 @@ def find_unwritten_inputs(context: CheckContext) -> Iterator[Finding]:
 
 def find_unwritten_library_inputs(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for every use of a library subtree in which an input may read an unwritten variable."""
-    inputs_by_use: dict[str, dict[str, str]] = {}
+    inputs_by_use: dict[SubtreeNode, dict[str, str]] = {}
     for read in _find_unwritten_reads(context, in_libraries=True):
-        path = context.library_uses_by_path[read.node.path].path
-        inputs_by_use.setdefault(path, {}).setdefault(read.variable, str(read))
-    uses = {use.path: use for use in context.library_uses_by_path.values()}
-    for path, inputs in inputs_by_use.items():
-        use = uses[path]
+        use = context.library_uses_by_path[read.node.path]
+        inputs_by_use.setdefault(use, {}).setdefault(read.variable, str(read))
+    for use, inputs in inputs_by_use.items():
         names = " and ".join(f"${name} (for {input_name})" for name, input_name in sorted(inputs.items()))
         message = f'the subtree "{use.name}" needs variables that may be unwritten at this node: {names}'
         writers = [(name, _describe_writers(context, name, use.span)) for name in sorted(inputs)]

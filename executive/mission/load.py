@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import ChainMap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from itertools import islice
 from pathlib import Path
@@ -27,14 +27,14 @@ from executive.mission.mission_file import Mission, Subtree, parse_library, pars
 from executive.mission.node_parser import NodeParser
 from executive.mission.ports import convert_setting, find_literals, find_wires
 from executive.perception.camera_model import find_calibration_doubts
-from executive.perception.detectors.envelope import find_unmeasured_detectors
+from executive.perception.detectors.envelope import find_envelopes
 from executive.skill import Direction, Param, Port, Skill
 from executive.text.files import find_cell, find_file_below, find_mission, get_shipped_folder, read_source
 from executive.text.findings import Finding, MissionError, Source, make_warning, sort_findings
 from executive.text.validate import KeyPath
 from executive.text.yaml_files import parse_yaml
 from executive.tree.blackboard import Blackboard, NodeContext, Wiring
-from executive.tree.node import ControlNode, ControlNodes, load_control_nodes
+from executive.tree.node import ControlNode, load_control_nodes
 from executive.tree.specification import Constant, InvalidNode, LocatedName, Node, SkillNode, SubtreeNode
 from executive.tree.tree_node import SkillLeaf, TreeNode
 
@@ -305,8 +305,10 @@ def load_mission(
         raise MissionError(sort_findings(findings, files.source.path))
     if checker is not None:
         folders = (cell.path.parent, get_shipped_folder() / "cells")
-        for keys, message in find_unmeasured_detectors(config, cell.path.parent, folders):
-            findings.append(make_warning(cell.find_span(keys, at_key=True), "not-measured", message))
+        for name, (error_rates, _) in find_envelopes(config, cell.path.parent, folders).items():
+            if message := error_rates.assumption_reason:
+                span = cell.find_span(("detectors", name), at_key=True)
+                findings.append(make_warning(span, "not-measured", message))
     libraries = [
         find_file_below(library_folder or mission_path.parent, library) for library in files.libraries
     ]
@@ -355,7 +357,6 @@ class TreeBuilder:
     blackboard: Blackboard
     emit: Emit
     substitutes: Skills
-    node_classes: ControlNodes = field(default_factory=load_control_nodes)
 
     def build_node(self, node: Node) -> TreeNode:
         """Return the behaviour for a node of the mission, with the behaviours of all nodes below it."""
@@ -371,7 +372,7 @@ class TreeBuilder:
                 # A node has one label, so the label of the `use` belongs to a sequence around the subtree.
                 root = body
                 if node.label:
-                    sequence = self.node_classes[SEQUENCE_KEYWORD].make({}, do=(subtree_root,))
+                    sequence = load_control_nodes()[SEQUENCE_KEYWORD].make({}, do=(subtree_root,))
                     root = sequence.Behaviour(context, sequence, lambda _: body)
                 root.subtree_names = (node.name, *root.subtree_names)
                 return root

@@ -160,10 +160,6 @@ class MotionProblem:
     clearance: ClearanceModel
     payload: PayloadLimit | None = None
 
-    def compute_slack(self, qs: Array) -> Array:
-        """Return the slack `(N,)` of joint positions `(N, n)` [rad]; it is negative for a violation."""
-        return self.find_nearest_pairs(qs, math.inf).slack
-
     def find_nearest_pairs(self, qs: Array, max_slack: float = MAX_SLACK) -> NearestPairs:
         """Return slack and nearest pairs at joint positions `(N, n)` [rad].
 

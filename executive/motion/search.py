@@ -155,7 +155,7 @@ class MotionSearch:
             with contextlib.suppress(JointLimitError, Unreachable):
                 free_part = self.problem.connector.connect(self.problem.start, candidate.free_part_end)
                 qs = free_part.sample(SAMPLE_FRACTIONS * free_part.duration).q
-                if self.problem.compute_slack(qs).min() >= 0:
+                if self.problem.find_nearest_pairs(qs, math.inf).slack.min() >= 0:
                     motion = self._build_motion(candidate, free_part)
                     direct_motions.append((motion.duration, motion))
                     continue

@@ -190,10 +190,8 @@ def _format(value: KeyValue) -> str:
     match value:
         case Constant(value=constant):
             return _format_constant(constant)
-        case Reference(name=name, field=field) if field:
-            return _format_pointer(f"{name}.{field}")
-        case Reference(name=name):
-            return _format_pointer(name)
+        case Reference(name=name, field=field):
+            return _format_pointer(f"{name}.{field}" if field else name)
         case VariableName():
             return _format_pointer(value)
         case KeySection() as section:

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -34,10 +36,10 @@ def test_slopes_are_the_derivatives_of_slack_by_the_joints(over_the_post, q: Arr
     problem = over_the_post
     qs = (problem.start.q + share * (q - problem.start.q))[None]
     h = 1e-5
-    here = problem.compute_slack(qs)
+    here = problem.find_nearest_pairs(qs, math.inf).slack
     found = problem.compute_gradients(qs, problem.find_nearest_pairs(qs))[0]
-    forward = (problem.compute_slack(qs + h * np.eye(7)) - here) / h
-    backward = (here - problem.compute_slack(qs - h * np.eye(7))) / h
+    forward = (problem.find_nearest_pairs(qs + h * np.eye(7), math.inf).slack - here) / h
+    backward = (here - problem.find_nearest_pairs(qs - h * np.eye(7), math.inf).slack) / h
     smooth = np.abs(forward - backward) < 1e-3  # no kink between
     assert np.allclose(found[smooth], forward[smooth], atol=2e-3)
 
@@ -46,6 +48,6 @@ def test_near_a_joints_limit_that_is_what_slack_and_slopes_tell(over_the_post) -
     problem = over_the_post
     qs = problem.start.q[None].copy()
     qs[0, 6] = -LIMITS.position.upper[6] + 0.003
-    slack = problem.compute_slack(qs)
+    slack = problem.find_nearest_pairs(qs, math.inf).slack
     assert slack[0] == pytest.approx(0.003 - 0.01)
     assert np.array_equal(problem.compute_gradients(qs, problem.find_nearest_pairs(qs))[0], np.eye(7)[6])

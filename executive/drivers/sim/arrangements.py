@@ -290,11 +290,8 @@ def simulate_fall(config: CellConfig, objects: Sequence[TrueObject]) -> list[Tru
         bodies = [add_body(client, get_model(scene_object), scene_object.X_WO) for scene_object in objects]
         for _ in range(SETTLING_STEP_COUNT):
             client.stepSimulation()
-        final_objects = []
-        for body, scene_object in zip(bodies, objects, strict=True):
-            X_WO = locate_object(client, body, get_model(scene_object))
-            final_objects.append(replace(scene_object, X_WO=X_WO))
-        return final_objects
+        pairs = zip(bodies, objects, strict=True)
+        return [replace(item, X_WO=locate_object(client, body, get_model(item))) for body, item in pairs]
     finally:
         client.disconnect()
 

@@ -74,7 +74,6 @@ class SimTool:
         self.holding = False
         self.held_body: int | None = None
         self.is_idle = True
-        self._is_closed = False
         self._grip: _Grip | None = None
         self._separating_body: int | None = None  # Lost body that is still within reach.
         self._last_touch_check = (-1, False)
@@ -109,14 +108,12 @@ class SimTool:
 
     def close(self) -> None:
         self._world.log_command(world_log.CLOSE)
-        self._is_closed = True
         self.is_idle = False
         if self._grip is None:
             self._try_to_grip()
 
     def open(self) -> None:
         self._world.log_command(world_log.OPEN)
-        self._is_closed = False
         self._separating_body = None
         if self._grip is not None:
             body = self._grip.body
@@ -139,7 +136,7 @@ class SimTool:
             grip.pull += PULL_SMOOTHING * (force - grip.pull)
             if self.pull > grip.force:
                 self.lose_grip()
-        elif self._is_closed:
+        elif not self.is_idle:
             self._try_to_grip()
 
     def _try_to_grip(self) -> None:

@@ -290,15 +290,6 @@ def describe_measurement_command(config: CellConfig) -> str:
     return f"measure it with `executive evaluate --cell {config.cell}` (about {MEASUREMENT_MINUTES} min)"
 
 
-def find_unmeasured_detectors(
-    config: CellConfig, base: Path, folders: Sequence[Path]
-) -> Iterator[tuple[tuple[str, str], str]]:
-    """Yield each detector without an applicable measurement: its keys in the cell file, and the reason."""
-    for name, (error_rates, _) in find_envelopes(config, base, folders).items():
-        if error_rates.assumption_reason:
-            yield ("detectors", name), error_rates.assumption_reason
-
-
 def find_measurable_detectors(config: CellConfig) -> Iterator[str]:
     """Yield the names of the detectors that can be measured: their kind is installed and not fake.
 

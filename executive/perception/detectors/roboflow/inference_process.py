@@ -59,11 +59,8 @@ class ApiKey:
         self.environment = dict(environment)
         """Environment variables of the process that uses the key."""
         self._key = environment.get(KEY_VARIABLE, "").strip()
-
-    @property
-    def is_set(self) -> bool:
+        self.is_set = bool(self._key)
         """True if the environment contains a key."""
-        return bool(self._key)
 
     def redact(self, text: str) -> str:
         """Return `text`, plain or JSON, without the key."""
