@@ -18,14 +18,7 @@ from executive.geometry import Array
 from executive.text.files import find_file_below, has_outside_link, is_outside_path, read_source
 from executive.text.findings import Finding, MissionError, Source, Span, make_error, sort_findings
 from executive.text.validate import BASE_KEY, KeyPath, find_span, override_cell, validate
-from executive.text.yaml_files import (
-    YamlMapping,
-    YamlNode,
-    YamlScalar,
-    YamlSequence,
-    list_scalars,
-    parse_yaml,
-)
+from executive.text.yaml_files import YamlMapping, YamlNode, YamlScalar, flatten, parse_yaml
 
 DETECTORS_KEY = "detectors"
 """Key whose value is merged with the value in the base, detector by detector."""
@@ -201,9 +194,9 @@ class _CellFileReader:
         """
         is_calibration = keys[:1] == ("cameras",) and keys[2:3] == ("calibration",)
         if not isinstance(node, YamlMapping):
-            return _flatten(node) if is_calibration else node
+            return flatten(node) if is_calibration else node
         if is_calibration and (data := node.get("data")):
-            return _flatten(data)
+            return flatten(data)
         # Only the calibration itself, and none of its parts, can name a file.
         entries = dict(self._insert_file(node).entries if is_calibration and len(keys) == 3 else node.entries)
         for key, entry in entries.items():
@@ -239,11 +232,6 @@ class _CellFileReader:
         entries = root.entries if isinstance(root, YamlMapping) else {}
         known = {CALIBRATION_KEYS[key]: entries[key] for key in entries if key in CALIBRATION_KEYS}
         return _inherit_entries(calibration, replace(calibration, entries=known))
-
-
-def _flatten(node: YamlNode) -> YamlNode:
-    """Return a list of lists as the list of their scalars, in order; return other nodes unchanged."""
-    return replace(node, items=tuple(list_scalars(node))) if isinstance(node, YamlSequence) else node
 
 
 def _merge_sections(sections: YamlNode, base: YamlNode | None) -> YamlNode:

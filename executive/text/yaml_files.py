@@ -123,6 +123,11 @@ def list_scalars(node: YamlNode) -> list[YamlScalar]:
     return [scalar for child in list_children(node) for scalar in list_scalars(child)]
 
 
+def flatten(node: YamlNode) -> YamlNode:
+    """Return a list of lists as the list of their scalars, in order; return other nodes unchanged."""
+    return replace(node, items=tuple(list_scalars(node))) if isinstance(node, YamlSequence) else node
+
+
 def list_children(node: YamlNode) -> tuple[YamlNode, ...]:
     """Return the items of a sequence, or the values of a mapping; () for a scalar."""
     if isinstance(node, YamlMapping):
