@@ -237,8 +237,8 @@ class TolerantStream:
     def _tolerate_errors(self) -> Iterator[None]:
         try:
             yield
-        except OSError as error:
-            self.error = error.strerror or str(error)
+        except (OSError, ValueError) as error:  # A closed stream raises a ValueError.
+            self.error = getattr(error, "strerror", "") or str(error)
             # Later writes, and the flush at the end of the process, go to the null device.
             with contextlib.suppress(OSError), open(os.devnull, "w") as null_file:
                 os.dup2(null_file.fileno(), self.stream.fileno())

@@ -299,6 +299,8 @@ class TerminalOperator:
                 return line[:MAX_LINE_LENGTH].decode(errors="replace") + "\n"
             if not self._has_keyboard:
                 time.sleep(KEYBOARD_POLL_PERIOD)
+            elif sys.stdin is None or not sys.stdin.readable():
+                return ""
             # `select` does not see what an object such as `sys.stdin` has read into its buffer.
             elif select.select([sys.stdin], [], [], KEYBOARD_POLL_PERIOD)[0]:
                 data = os.read(sys.stdin.fileno(), MAX_READ_SIZE)

@@ -240,8 +240,7 @@ class Station:
         """Wait for the next tick of the devices."""
         self.driver.clock.wait_for_tick()
         self.tick_count += 1
-        if self._emptied_ticks:
-            self._remove_emptied_objects()
+        self._remove_emptied_objects()
         for callback in self.tick_callbacks:
             callback()
 
@@ -259,7 +258,7 @@ class Station:
         # A process may have been killed after the record of this tick, and before the objects disappeared.
         bins = [name for name, tick in self._emptied_ticks.items() if tick >= self.border.tick - 1]
         self._emptied_ticks.clear()
-        if not isinstance(self.driver, TrueWorld):
+        if not bins or not isinstance(self.driver, TrueWorld):
             return
         final_objects = self.driver.list_final_objects()
         objects = [each for each in final_objects if not each.is_held and not each.is_removed]
@@ -287,6 +286,8 @@ class Station:
         """
         if not isinstance(self.driver, TrueWorld):
             return None
+        # The run may have ended in the tick in which a bin was emptied.
+        self._remove_emptied_objects()
         objects = self.driver.list_final_objects()
         gate = self.config.ledger.gate
         ignored_positions = self.ledger.ignored_positions

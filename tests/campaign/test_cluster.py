@@ -197,7 +197,7 @@ def test_a_worker_with_other_software_is_described() -> None:
 
 @contextmanager
 def running(folder: Path, pattern: str, *words: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
-    """Start a program of dask; yield it, and the first group of the pattern in its log; kill it in the end."""
+    """Start a program of dask; yield it and the first group of the pattern in its log; kill it at the end."""
     command = [sys.executable, "-m", "dask", *words, "--no-dashboard"]
     process = subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True, start_new_session=True)
     try:

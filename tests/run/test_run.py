@@ -10,6 +10,7 @@ import pytest
 from py_trees.common import Status
 
 from executive.behaviours import load_skills
+from executive.cell.devices import TrueObject
 from executive.events import Event, RequestGiven, RunEnded, TimedEvent, ToolCommanded
 from executive.mission.load import load_mission
 from executive.run.assembly import RunOptions, assemble
@@ -35,11 +36,11 @@ def running(run: Run) -> list[str]:
     return [node.name for node in run.root.iterate() if node.status is Status.RUNNING]
 
 
-def never_seal(fake: FakeCell, stubborn: FakeObject) -> None:
+def never_seal(fake: FakeCell, stubborn: TrueObject) -> None:
     fake.tool.can_hold = lambda: fake.world.find_touched_object(fake.arm.tool_pose.position) is not stubborn
 
 
-def always_slip(fake: FakeCell, stubborn: FakeObject) -> None:
+def always_slip(fake: FakeCell, stubborn: TrueObject) -> None:
     advance = fake.advance
 
     def slipping() -> None:
@@ -53,7 +54,7 @@ def always_slip(fake: FakeCell, stubborn: FakeObject) -> None:
 
 @pytest.mark.parametrize("resist", [never_seal, always_slip])
 def test_an_object_that_cannot_be_had_is_rejected_and_the_others_go_on(
-    missions: Path, resist: Callable[[FakeCell, FakeObject], None]
+    missions: Path, resist: Callable[[FakeCell, TrueObject], None]
 ) -> None:
     run, _ = make(missions)
     resist(fake_of(run), fake_of(run).world.objects[0])

@@ -43,7 +43,8 @@ OUTSIDE = ("/etc/x.obj", "../x.obj", "link.obj", "file:///etc/x.obj", "http://x.
 @pytest.mark.parametrize(
     ("part", "mesh", "error"),
     [
-        *(("visual", mesh, f'names the file "{mesh}", which is outside of its folder; copy') for mesh in OUTSIDE),
+        *(("visual", mesh, f'names the file "{mesh}", which is outside of its folder; copy')
+          for mesh in OUTSIDE),
         *((part, "pipe.obj", r"^there is no model .*pipe\.obj, neither beside the cell file nor")
           for part in ("visual", "collision")),
         ("collision", "m.obj", r"^the model m\.obj has more than 20000 triangles; simplify the mesh$"),
