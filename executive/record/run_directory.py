@@ -51,15 +51,15 @@ class RunDirectory:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        # A skill may change the working directory.
+        self.tree = path / "tree.json"
+        self.report = path / "report.html"
+        self.libraries = path / "libraries"
+        # A skill may change the working directory while these files are written.
         folder = path.absolute()
         self.journal = folder / "journal.jsonl"
         self.world_log = folder / "world.log"
-        self.tree = folder / "tree.json"
-        self.report = folder / "report.html"
         self.result = folder / "result.json"
         self.pictures = folder / "frames"
-        self.libraries = folder / "libraries"
 
     def save_inputs(self, texts: Mapping[str, str], libraries: Mapping[str, str]) -> None:
         """Write and sync the inputs of the run, and let the link `runs/latest` point to this directory.
