@@ -16,9 +16,7 @@ from guide_blocks import GUIDES, ROOT, TUTORIAL, blocks, files, read, shown, tra
 
 from executive.behaviours import load_skills
 from executive.cli.main import main
-from executive.drivers.sim.scene import (
-    load_scene,
-)
+from executive.drivers.sim.scene import load_scene
 from executive.events import Event
 from executive.mission.cell_file import load_cell
 from executive.mission.load import LoadedMission, load_mission

@@ -18,12 +18,7 @@ import numpy as np
 from executive.cell.frame import Answer
 from executive.errors import Fault
 from executive.station.station import Station
-from executive.testing.faults import (
-    after,
-    during,
-    make_detector_effect,
-    tool_does_not_release,
-)
+from executive.testing.faults import after, during, make_detector_effect, tool_does_not_release
 from executive.testing.faulty_cell import Effect, Occurrence, ScheduledFault
 from executive.testing.run_mission import MissionResult, run_mission
 from tests.benchmarks.report import Figures, run_command

@@ -6,13 +6,7 @@ import pytest
 
 from executive.campaign.evaluation import list_metrics
 from executive.cli.shared import print_report
-from executive.training.metrics import (
-    ClassMetrics,
-    CountedRate,
-    Distribution,
-    Evaluation,
-    MeasuredErrorRates,
-)
+from executive.training.metrics import ClassMetrics, CountedRate, Distribution, Evaluation, MeasuredErrorRates
 
 MEASURED = Evaluation(
     threshold=0.5, images=300, objects=900, precision=0.991, recall=0.98, map50=0.995, map50_95=0.8,

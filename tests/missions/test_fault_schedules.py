@@ -10,12 +10,7 @@ import pytest
 from executive.cell.frame import Answer
 from executive.station.station import Station
 from executive.testing.fake_cell import FakeCell
-from executive.testing.faults import (
-    after,
-    during,
-    make_detector_effect,
-    object_bumped,
-)
+from executive.testing.faults import after, during, make_detector_effect, object_bumped
 from executive.testing.faulty_cell import Effect, Occurrence, ScheduledFault
 from executive.testing.run_mission import MissionResult, run_mission
 

@@ -6,10 +6,7 @@ import numpy as np
 import pytest
 
 from executive.events import FaultInjected, FrameSearched, MotionPlanned, ToolCommanded
-from executive.testing.faults import (
-    after,
-    detector_dead,
-)
+from executive.testing.faults import after, detector_dead
 from executive.testing.run_mission import run_mission
 
 LONGEST_RESTART = 40.0

@@ -10,10 +10,7 @@ import pytest
 from executive.cell.config import DetectorConfig
 from executive.errors import InputError
 from executive.perception.detectors import detector_registry
-from executive.perception.detectors.detector_registry import (
-    build_kinds,
-    find_detector_errors,
-)
+from executive.perception.detectors.detector_registry import build_kinds, find_detector_errors
 
 INSTALLED = ", ".join(sorted(detector_registry.find_detector_kinds()))
 

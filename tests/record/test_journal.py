@@ -9,16 +9,7 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
-from events import (
-    at,
-    detected,
-    frame_searched,
-    item_changed,
-    read,
-    run_ended,
-    run_started,
-    skill_ended,
-)
+from events import at, detected, frame_searched, item_changed, read, run_ended, run_started, skill_ended
 
 from executive import events as kinds
 from executive.errors import Fault, InputError, RecordLost

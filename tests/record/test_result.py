@@ -8,14 +8,7 @@ from dataclasses import asdict
 import pytest
 
 from executive.cell.json_values import to_json
-from executive.record.result import (
-    Audit,
-    ItemCounts,
-    Result,
-    find_exit_code,
-    read_result,
-    write_result,
-)
+from executive.record.result import Audit, ItemCounts, Result, find_exit_code, read_result, write_result
 from executive.record.run_directory import RunDirectory
 
 ITEMS = ItemCounts(seen=3, placed=2, rejected=1, phantom=1)

@@ -7,13 +7,7 @@ import pytest
 
 from executive.errors import InputError
 from executive.training.metrics import Distribution, Evaluation
-from executive.training.train import (
-    choose_learning_rate,
-    load_dataset,
-    read_epochs,
-    render_card,
-    train,
-)
+from executive.training.train import choose_learning_rate, load_dataset, read_epochs, render_card, train
 
 
 def test_a_training_that_cannot_start_is_refused(tmp_path):

@@ -6,10 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from executive.record.result import (
-    MAX_LINE_WIDTH,
-    format_diagnosis,
-)
+from executive.record.result import MAX_LINE_WIDTH, format_diagnosis
 from tests.record.failed_runs import PICK, FailedRun
 
 CUBE = [("cube", 0.5, 0.1)]

@@ -8,13 +8,7 @@ import pytest
 from executive.cell.config import CellConfig
 from executive.cell.device_config import DepthConfig
 from executive.cell.devices import StepClock
-from executive.drivers.sim.camera import (
-    CELL_LIGHT,
-    SimCamera,
-    add_depth_noise,
-    get_camera_pose,
-    render,
-)
+from executive.drivers.sim.camera import CELL_LIGHT, SimCamera, add_depth_noise, get_camera_pose, render
 from executive.drivers.sim.models import load_mesh
 from executive.drivers.sim.world import World
 from executive.geometry import Pose, rotate_about_z

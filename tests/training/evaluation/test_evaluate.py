@@ -9,11 +9,7 @@ import pytest
 
 from executive.errors import NoDepth
 from executive.training.evaluate import evaluate
-from executive.training.metrics import (
-    ClassMetrics,
-    CountedRate,
-    MeasuredErrorRates,
-)  # fmt: skip
+from executive.training.metrics import ClassMetrics, CountedRate, MeasuredErrorRates
 
 
 @pytest.fixture

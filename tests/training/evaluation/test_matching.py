@@ -9,11 +9,7 @@ import pytest
 
 from executive.cell.frame import Detection
 from executive.training.dataset import save_image
-from executive.training.evaluate import (
-    collect_mistakes,
-    draw_sheet,
-    find_mistakes,
-)  # fmt: skip
+from executive.training.evaluate import collect_mistakes, draw_sheet, find_mistakes
 from executive.training.metrics import is_ignored, match_detections
 
 
