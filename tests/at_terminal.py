@@ -1,4 +1,4 @@
-"""Commands as a person calls them at a terminal, and as a pipe does."""
+"""Commands as a person calls them at a terminal, as a pipe does, and in the process of a test."""
 
 from __future__ import annotations
 
@@ -10,6 +10,10 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+from click.testing import CliRunner, Result
+
+from executive.cli.main import main
+
 COLOUR = re.compile(r"\x1b\[[\d;]*3\d[\d;]*m")
 """Sets the colour of letters; bold and dim are none."""
 
@@ -20,6 +24,11 @@ class Called:
 
     code: int
     stderr: str
+
+
+def invoke(*words: object) -> Result:
+    """Call `executive` in this process."""
+    return CliRunner().invoke(main, [str(word) for word in words])
 
 
 def call(*words: str, folder: Path, terminal: bool, **environment: str) -> Called:

@@ -11,11 +11,10 @@ from types import ModuleType
 
 import jsonschema
 import pytest
-from click.testing import CliRunner
+from at_terminal import invoke
 from guide_blocks import GUIDES, ROOT, TUTORIAL, blocks, files, read, shown, transcripts
 
 from executive.behaviours import load_skills
-from executive.cli.main import main
 from executive.drivers.sim.scene import load_scene
 from executive.events import Event
 from executive.mission.cell_file import load_cell
@@ -95,7 +94,7 @@ def test_an_editor_marks_nothing_in_the_missions_of_the_mission_guides(name: str
 def test_every_command_of_the_mission_guides_prints_what_is_shown(
     words: list[str], printed: str, folder: Path
 ) -> None:
-    assert lasting(CliRunner().invoke(main, words).output) == lasting(printed)
+    assert lasting(invoke(*words).output) == lasting(printed)
 
 
 def lasting(printed: str) -> str:

@@ -7,10 +7,9 @@ from pathlib import Path
 
 import pytest
 import yaml
-from click.testing import CliRunner
+from at_terminal import invoke
 
 from executive.behaviours import load_skills
-from executive.cli.main import main
 from executive.mission.cell_file import load_cell
 from executive.mission.load import load_mission
 from executive.physics.model_files import find_model
@@ -76,7 +75,7 @@ def test_a_replay_needs_no_arm_file() -> None:
     ):
         if words[0] == "replay":
             Path("cells/arms/cobot.yaml").unlink()
-        result = CliRunner().invoke(main, words)
+        result = invoke(*words)
         assert result.exit_code == status, result.output
 
 

@@ -6,10 +6,9 @@ import json
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
+from at_terminal import invoke
 
 from executive.behaviours import load_skills
-from executive.cli.main import main
 from executive.text.files import list_shipped_missions
 
 MISSION = """\
@@ -32,10 +31,6 @@ SHIPPED = f"Shipped missions: {', '.join(list_shipped_missions())}.\n"
 def _in_a_folder_with_a_mission(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("m.yaml").write_text(MISSION)
-
-
-def invoke(*words: str) -> Result:
-    return CliRunner().invoke(main, words)
 
 
 def test_a_mistake_is_printed_by_check_and_run_and_nothing_is_run() -> None:

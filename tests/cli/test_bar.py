@@ -5,10 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from at_terminal import COLOUR, call
-from click.testing import CliRunner
+from at_terminal import COLOUR, call, invoke
 
-from executive.cli.main import main
 from executive.cli.shared import show_progress
 
 FAKE = ("--set", "cell.kind=fake")
@@ -55,7 +53,7 @@ def test_train_shows_batches_and_a_line_per_epoch(monkeypatch: pytest.MonkeyPatc
 
     monkeypatch.setattr("executive.training.train.train", train)
     monkeypatch.setattr("executive.training.train.load_dataset", lambda _folder: {})
-    shown = CliRunner().invoke(main, ("train", "--dataset", "data", "--out", "out", "--epochs", "2"))
+    shown = invoke("train", "--dataset", "data", "--out", "out", "--epochs", "2")
     assert shown.exit_code == 0, shown.stderr
     assert "training" in shown.stderr and "4/4" in shown.stderr
     assert "epoch 1 of 2: loss 0.5123" in shown.stderr

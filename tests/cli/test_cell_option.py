@@ -6,14 +6,9 @@ import json
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
+from at_terminal import invoke
 
-from executive.cli.main import main
 from executive.record.journal import find_run_start, read_journal
-
-
-def invoke(*words: str) -> Result:
-    return CliRunner().invoke(main, words)
 
 
 @pytest.fixture

@@ -12,11 +12,10 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from click.testing import CliRunner
+from at_terminal import invoke
 
 import executive.campaign.sweep  # noqa: F401 - imported before `load_mission` is replaced
 from executive.cell.json_values import to_json
-from executive.cli.main import main
 from executive.errors import Fault, InputError
 from executive.mission.analysis import UnhandledFailure
 from executive.record.result import Audit, ItemCounts, Result
@@ -57,10 +56,6 @@ def project(monkeypatch):
     monkeypatch.setattr("executive.behaviours.load_skills", dict)
     monkeypatch.setattr("executive.view.report.try_write_report", lambda run: ("runs/x/report.html", ""))
     return asked
-
-
-def invoke(*words: str):
-    return CliRunner().invoke(main, words)
 
 
 def test_sigterm_ends_a_command_with_a_word_as_ctrl_c_does(project, monkeypatch):

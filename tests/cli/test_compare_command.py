@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner, Result
+from at_terminal import invoke
+from click.testing import Result
 from test_sweep_command import make_record
 
 from executive.campaign.jobs import SweepJob
-from executive.cli.main import main
 
 
 @pytest.fixture
@@ -30,11 +30,11 @@ def compare(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., Re
 
     monkeypatch.setattr("executive.campaign.sweep.run_jobs", run_jobs)
 
-    def invoke(*words: str) -> Result:
+    def compare_with(*words: str) -> Result:
         runs = () if "--resume" in words else ("--runs", str(tmp_path / "runs"))
-        return CliRunner().invoke(main, ("compare", *words, *runs))
+        return invoke("compare", *words, *runs)
 
-    return invoke
+    return compare_with
 
 
 def test_each_side_may_have_a_cell_of_its_own(compare) -> None:

@@ -11,9 +11,7 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
-
-from executive.cli.main import main
+from at_terminal import invoke
 
 OBJECTS = ("--set", "cell.table.objects=[1, 1]")
 
@@ -38,10 +36,6 @@ def wait_for_runs(sweep: subprocess.Popen[str], folder: Path, count: int) -> Non
     while count_stored(folder) < count:
         assert sweep.poll() is None
         time.sleep(0.02)
-
-
-def invoke(*words: str) -> Result:
-    return CliRunner().invoke(main, words)
 
 
 @pytest.mark.slow

@@ -8,12 +8,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
+from at_terminal import invoke
 
 from executive import plugins
 from executive.behaviours import load_skills
 from executive.cli import setup
-from executive.cli.main import main
 from executive.cli.setup import CheckResult
 from executive.errors import InputError
 from executive.plugins import DISTRIBUTION
@@ -75,7 +74,7 @@ def test_a_plugin_that_cannot_be_loaded_is_an_error(
 def test_only_a_problem_makes_the_command_fail(monkeypatch: pytest.MonkeyPatch, status: str) -> None:
     result = CheckResult(status, "packages", "av is missing")
     monkeypatch.setattr(setup, "run_checks", lambda: [result])
-    text, as_json = (CliRunner().invoke(main, ["doctor", *options]) for options in ((), ("--json",)))
+    text, as_json = (invoke("doctor", *options) for options in ((), ("--json",)))
     assert text.exit_code == as_json.exit_code == (status == "problem")
     assert text.stdout.split(maxsplit=2) == [status, "packages", "av is missing\n"]
     assert json.loads(as_json.stdout) == [result._asdict()]

@@ -7,9 +7,8 @@ import json
 import cv2
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from at_terminal import invoke
 
-from executive.cli.main import main
 from executive.perception.detectors.envelope import read_measurements
 from executive.perception.detectors.rfdetr import LABELS_PATH, MODEL_PATH
 from executive.training.dataset import DatasetEntry, build_image_path, save_image, write_annotations
@@ -28,7 +27,7 @@ def dataset(tmp_path, monkeypatch):
 
 def evaluate(*arguments, code=0):
     """Return what the command says and the figures it prints."""
-    result = CliRunner().invoke(main, ["evaluate", "--json", *map(str, arguments)])
+    result = invoke("evaluate", "--json", *map(str, arguments))
     assert result.exit_code == code, result.output
     return result.stderr, json.loads(result.stdout) if result.stdout else None
 

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner, Result
+from at_terminal import invoke
+from click.testing import Result
 
 from executive.campaign.fault_list import PlannedFault, SkillFault
 from executive.campaign.faults import Campaign, Trial
-from executive.cli.main import main
 
 FAKE = ("sort_overhead", "--set", "cell.kind=fake")
 FAULT = PlannedFault(
@@ -20,16 +20,16 @@ FAULT = PlannedFault(
 TRIAL = Trial("SUCCESS", "", "", "", True, "", 10, 1.0, faults={1: FAULT}, have_occurred=True)
 
 
-def invoke(*words: str) -> Result:
-    return CliRunner().invoke(main, ("faults", *words))
+def faults(*words: str) -> Result:
+    return invoke("faults", *words)
 
 
 def test_faults_are_listed_and_one_is_repeated_and_recorded(tmp_path: Path) -> None:
-    listed = json.loads(invoke(*FAKE, "--list", "--json").stdout)
-    lines = invoke(*FAKE, "--list").stdout.splitlines()
+    listed = json.loads(faults(*FAKE, "--list", "--json").stdout)
+    lines = faults(*FAKE, "--list").stdout.splitlines()
     assert [line.split()[0] for line in lines] == [str(entry["fault"]) for entry in listed]
     number = next(entry["fault"] for entry in listed if "Grasp missed, first: grip" in entry["description"])
-    shown = invoke(*FAKE, "--fault", str(number), "--runs", str(tmp_path))
+    shown = faults(*FAKE, "--fault", str(number), "--runs", str(tmp_path))
     lines = shown.stdout.splitlines()
     assert (shown.exit_code, lines[1]) == (0, "  SUCCESS")
     assert lines[0].startswith(f"fault {number}: tree/")
@@ -45,7 +45,7 @@ def test_faults_are_listed_and_one_is_repeated_and_recorded(tmp_path: Path) -> N
     ],
 )
 def test_contradicting_options_are_refused(words: tuple[str, ...], expected: str) -> None:
-    shown = invoke(*FAKE, *words)
+    shown = faults(*FAKE, *words)
     assert (shown.exit_code, expected in shown.stderr) == (2, True)
 
 
@@ -71,6 +71,6 @@ def test_the_exit_code_depends_on_the_trials(
 
     monkeypatch.setattr(Campaign, "run_single_faults", run)
     monkeypatch.setattr(Campaign, "run_fault_pairs", run)
-    shown = invoke(*FAKE, "--seed", "4", *words)
+    shown = faults(*FAKE, "--seed", "4", *words)
     assert (shown.exit_code, expected in shown.stdout) == (code, True)
     assert asked == [(4, 7) if words[:1] == ("--pairs",) else (4,)]

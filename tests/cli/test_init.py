@@ -9,9 +9,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
+from at_terminal import invoke
+from click.testing import Result
 
-from executive.cli.main import main
 from executive.cli.setup import (
     FOLDERS,
     PACKAGE,
@@ -30,7 +30,7 @@ BIN = Path(sys.executable).parent
 
 
 def init(*words: str) -> Result:
-    return CliRunner().invoke(main, ["init", *words])
+    return invoke("init", *words)
 
 
 def called(*words: str, folder: Path) -> subprocess.CompletedProcess[str]:

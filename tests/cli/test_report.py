@@ -7,15 +7,9 @@ import shutil
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
-
-from executive.cli.main import main
+from at_terminal import invoke
 
 FEW = ("--set", "cell.kind=fake", "--set", "cell.table.objects=[1, 1]")
-
-
-def invoke(*words: str) -> Result:
-    return CliRunner().invoke(main, words)
 
 
 @pytest.fixture(scope="module")

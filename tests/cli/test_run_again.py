@@ -6,13 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
-
-from executive.cli.main import main
-
-
-def invoke(*words: str):
-    return CliRunner().invoke(main, words)
+from at_terminal import invoke
 
 
 @pytest.fixture

@@ -7,14 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner, Result
+from at_terminal import invoke
 
-from executive.cli.main import main
 from executive.record.run_directory import RunDirectory, find_recorded_options
-
-
-def invoke(*words: str) -> Result:
-    return CliRunner().invoke(main, words)
 
 
 @pytest.fixture

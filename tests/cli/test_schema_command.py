@@ -5,10 +5,9 @@ from __future__ import annotations
 import json
 
 import pytest
-from click.testing import CliRunner
+from at_terminal import invoke
 
 from executive.behaviours import load_skills
-from executive.cli.main import main
 from executive.mission.schema import (
     make_arm_schema,
     make_cell_schema,
@@ -28,6 +27,6 @@ from executive.tree.node import load_control_nodes
     ],
 )
 def test_the_schema_asked_for_is_printed(options: list[str], expected: object) -> None:
-    result = CliRunner().invoke(main, ["schema", *options])
+    result = invoke("schema", *options)
     assert result.exit_code == 0
     assert json.loads(result.stdout) == expected

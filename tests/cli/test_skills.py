@@ -7,9 +7,9 @@ from enum import Enum
 from typing import ClassVar
 
 import pytest
-from click.testing import CliRunner, Result
+from at_terminal import invoke
+from click.testing import Result
 
-from executive.cli.main import main
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Out, Skill, param, port
 
 
@@ -52,7 +52,7 @@ def installed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def shown(*words: str) -> Result:
-    return CliRunner().invoke(main, ["skills", *words])
+    return invoke("skills", *words)
 
 
 def test_json_tells_everything_of_one_skill_as_one_object_and_of_all_as_one_array():

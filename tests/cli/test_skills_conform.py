@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from click.testing import CliRunner, Result
+from at_terminal import invoke
+from click.testing import Result
 
 from executive.cell.protocols import Cell, Steps
-from executive.cli.main import main
 from executive.skill import Skill
 from executive.testing.conformance import RULES
 
@@ -36,7 +36,7 @@ def installed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def conform(*words: str) -> Result:
-    return CliRunner().invoke(main, ["skills", *words, "--conform"])
+    return invoke("skills", *words, "--conform")
 
 
 def test_a_skill_that_conforms_has_a_line_per_check_and_exit_code_0() -> None:

@@ -8,9 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
-
-from executive.cli.main import main
+from at_terminal import invoke
 
 EXECUTIVE = f'"{sys.executable}" -m executive.cli.main'
 
@@ -42,7 +40,7 @@ def test_control_characters_of_a_file_are_shown_escaped(
     monkeypatch.chdir(tmp_path)
     Path("m.yaml").write_text('mission: "\\e[2Jred"\ntree: "\\e]0;title\\a"\n')
     for words in (["check", "m.yaml"], ["check", "m.yaml", "--json"], ["run", "m.yaml"]):
-        done = CliRunner().invoke(main, words)
+        done = invoke(*words)
         assert done.exit_code == 2
         assert "\\u001b]0;title\\u0007" in done.output
         assert not any(character in done.output for character in "\x1b\x07\x9b")

@@ -9,11 +9,11 @@ from typing import Any
 from xml.etree import ElementTree
 
 import pytest
-from click.testing import CliRunner, Result
+from at_terminal import invoke
+from click.testing import Result
 
 from executive.campaign.jobs import SweepJob
 from executive.campaign.results import RunRecord, RunRow, SkillRow
-from executive.cli.main import main
 from executive.record.result import Audit, ItemCounts
 
 
@@ -35,16 +35,16 @@ def make_record(job: SweepJob, status: str = "SUCCESS") -> RunRecord:
 def sweep(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., Result]:
     """Function that sweeps; the run of each job has the next of the statuses, and no run follows the last."""
 
-    def invoke(statuses: str, *words: str) -> Result:
+    def sweep_with(statuses: str, *words: str) -> Result:
         def run_jobs(jobs: list[SweepJob], _run: Any, _fail: Any, _options: Any, store: Any) -> None:
             for job, status in zip(jobs, statuses.split(), strict=False):
                 store(job.index, make_record(job, status), 0)
 
         monkeypatch.setattr("executive.campaign.sweep.run_jobs", run_jobs)
         folder = () if "--resume" in words else ("sort_fruit", "--runs", str(tmp_path / "runs"))
-        return CliRunner().invoke(main, ("sweep", *folder, *words))
+        return invoke("sweep", *folder, *words)
 
-    return invoke
+    return sweep_with
 
 
 @pytest.mark.parametrize(

@@ -6,9 +6,9 @@ import json
 from xml.etree import ElementTree
 
 import pytest
-from click.testing import CliRunner, Result
+from at_terminal import invoke
+from click.testing import Result
 
-from executive.cli.main import main
 from executive.text.files import get_shipped_folder
 
 SHIPPED = sorted(path.stem for path in get_shipped_folder().glob("*.yaml"))
@@ -16,7 +16,7 @@ QUICK = ("sort_overhead", "kit_fasteners")
 
 
 def shown(*words: str) -> Result:
-    return CliRunner().invoke(main, ["tree", *words])
+    return invoke("tree", *words)
 
 
 @pytest.mark.parametrize(

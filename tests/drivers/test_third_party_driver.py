@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from at_terminal import invoke
+from click.testing import Result
 
 from executive.cell.devices import DriverOptions
-from executive.cli.main import main
 from executive.drivers.sim.driver import SimDriver
 from executive.mission.cell_file import load_cell
 from executive.record.journal import read_journal
@@ -62,23 +62,19 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, images: np.ndarray)
     sys.modules.pop("lab_driver", None)
 
 
-def call(*words: str) -> Result:
-    return CliRunner().invoke(main, list(words))
-
-
 def test_the_driver_is_one_short_file() -> None:
     assert len(DRIVER.read_text().splitlines()) <= 120
 
 
 def run_lab(*words: str) -> Result:
-    return call("run", *ON_LAB, "--quiet", *words)
+    return invoke("run", *ON_LAB, "--quiet", *words)
 
 
 def test_its_cells_are_checked(project: Path) -> None:
-    checked = call("check", *ON_LAB)
+    checked = invoke("check", *ON_LAB)
     assert checked.exit_code == 0, checked.output
     (project / "images.npy").unlink()
-    checked = call("check", *ON_LAB)
+    checked = invoke("check", *ON_LAB)
     assert "lab.yaml:3" in checked.output and "has no images.npy" in checked.output
 
 
@@ -88,7 +84,7 @@ def test_a_shipped_mission_sorts_all_objects_and_is_replayed(project: Path) -> N
     assert done.exit_code == 0, done.output
     result = json.loads(done.stdout)
     assert (result["status"], result["items"]["placed"], result["audit"]) == ("SUCCESS", 3, None)
-    replayed = call("replay", "latest")
+    replayed = invoke("replay", "latest")
     assert "all as recorded" in replayed.output, replayed.output
 
 
@@ -109,7 +105,7 @@ def test_a_killed_run_continues_with_the_objects_that_are_left(project: Path, im
     (run / "journal.jsonl").write_text("".join(lines[: kept + 1]))
     (run / "result.json").unlink()
     np.save("images.npy", images[1:])
-    resumed = call("run", "--resume", "latest", "--json")
+    resumed = invoke("run", "--resume", "latest", "--json")
     assert resumed.exit_code == 0, resumed.output
     assert json.loads(resumed.stdout)["items"]["placed"] == 3
     times = [timed.clock for timed in read_journal(run / "journal.jsonl")]

@@ -5,9 +5,8 @@ from __future__ import annotations
 import json
 
 import pytest
-from click.testing import CliRunner
+from at_terminal import invoke
 
-from executive.cli.main import main
 from executive.text.findings import MAX_PRINTED_FINDINGS
 
 HEAD = "mission: m\ncell: cells/overhead.yaml\nroutes: {cube: red_bin}\n"
@@ -20,7 +19,7 @@ def check(tmp_path, monkeypatch):
 
     def run(text: str, *options: str) -> tuple[int, str]:
         (tmp_path / "m.yaml").write_text(text)
-        done = CliRunner().invoke(main, ["check", "m.yaml", *options])
+        done = invoke("check", "m.yaml", *options)
         return done.exit_code, done.stdout
 
     return run

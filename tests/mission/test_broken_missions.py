@@ -15,10 +15,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
-from click.testing import CliRunner
+from at_terminal import invoke
 
 from executive.behaviours import load_skills
-from executive.cli.main import main
 from executive.cli.shared import keep_stdout_clean
 from executive.mission.load import CheckerFinder, load_mission
 from executive.skill import Skill
@@ -108,7 +107,7 @@ def test_exactly_the_expected_findings_are_found_and_underlined(path: Path, look
 
 def test_the_command_prints_what_is_found_and_refuses_to_go_on(look: Look) -> None:
     mistakes = FOLDER / "many-in-three-files.yaml"
-    result = CliRunner().invoke(main, ["check", mistakes.name])
+    result = invoke("check", mistakes.name)
     assert result.exit_code == 2
     assert result.output.splitlines() == "\n".join(map(str, look(mistakes))).splitlines()
 

@@ -9,11 +9,11 @@ from unittest.mock import Mock
 
 import py_trees
 import pytest
-from click.testing import CliRunner, Result
+from at_terminal import invoke
+from click.testing import Result
 
 from executive.behaviours import load_skills
 from executive.cell.json_values import to_json
-from executive.cli.main import main
 from executive.errors import InputError
 from executive.events import RunEnded, RunStarted, TargetSelected
 from executive.mission.load import load_mission
@@ -146,7 +146,7 @@ def run_command(bring_one, tmp_path, monkeypatch, drivers):
         before = set(tmp_path.glob("runs/[0-9]*/*"))
         few = ("--set", "cell.kind=fake", "--set", "cell.table.objects=[1, 1]")
         words = ["run", bring_one, "--runs", str(tmp_path / "runs"), *few, "--json"]
-        shown = CliRunner().invoke(main, words)
+        shown = invoke(*words)
         (left,) = set(tmp_path.glob("runs/[0-9]*/*")) - before or {None}
         return shown, left
 

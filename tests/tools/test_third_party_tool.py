@@ -7,10 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from at_terminal import invoke
 
 from executive.behaviours import load_skills
-from executive.cli.main import main
 from executive.drivers.sim.world import SimVisuals, World
 from executive.mission.cell_file import load_cell
 from executive.mission.load import load_mission
@@ -70,8 +69,8 @@ def put_objects(cell: FakeCell) -> None:
 
 
 def test_a_mission_with_it_is_checked(write: WriteMission) -> None:
-    assert CliRunner().invoke(main, ["check", str(write("{cube: red_bin}"))]).exit_code == 0
-    result = CliRunner().invoke(main, ["check", str(write("{cube: red_bin, sphere: blue_bin}"))])
+    assert invoke("check", str(write("{cube: red_bin}"))).exit_code == 0
+    result = invoke("check", str(write("{cube: red_bin, sphere: blue_bin}")))
     assert "error[robot]: the magnet cannot hold a sphere" in result.output
 
 
@@ -79,7 +78,7 @@ def test_its_section_is_validated_with_its_own_keys(mission: Path) -> None:
     mission.with_name("yard.yaml").write_text(
         mission.with_name("yard.yaml").read_text().replace("force", "fource")
     )
-    output = CliRunner().invoke(main, ["check", str(mission)]).output
+    output = invoke("check", str(mission)).output
     assert 'error[unknown-key]: tool has no key "fource"' in output
     assert "force" in output.partition("Keys of tool")[2]
 

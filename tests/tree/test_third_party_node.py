@@ -8,10 +8,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
+from at_terminal import invoke
 
 from executive.behaviours import load_skills
-from executive.cli.main import main
 from executive.events import NodeEnded
 from executive.mission.load import load_mission
 from executive.station.check import load_checker
@@ -93,7 +92,7 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A new project with the control node `race`; it is the working directory."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", [*sys.path])
-    created = call("init", "arena")
+    created = invoke("init", "arena")
     assert created.exit_code == 0, created.output
     folder = tmp_path / "arena"
     (folder / "arena" / "race.py").write_text(RACE, encoding="utf-8")
@@ -109,10 +108,6 @@ def write(tree: str) -> Path:
     path = Path("race.yaml")
     path.write_text(MISSION.format(tree=tree), encoding="utf-8")
     return path
-
-
-def call(*words: str) -> Result:
-    return CliRunner().invoke(main, list(words))
 
 
 @pytest.mark.parametrize(
@@ -131,13 +126,13 @@ def test_a_mission_that_uses_it_is_checked(project: Path, tree: str, code: str) 
 
 
 def test_it_is_in_the_schema_the_hints_and_the_drawings(project: Path) -> None:
-    definitions = json.loads(call("schema").stdout)["definitions"]
+    definitions = json.loads(invoke("schema").stdout)["definitions"]
     assert set(definitions["race"]["anyOf"][1]["properties"]) == {"head_start", "do"}
     assert "race" in definitions["node"]["dependencies"]
-    assert 'Did you mean "race"?' in call("check", str(write("{rase: [Wait: {seconds: 1}]}"))).output
+    assert 'Did you mean "race"?' in invoke("check", str(write("{rase: [Wait: {seconds: 1}]}"))).output
     path = str(write("{race: {head_start: 0.5, do: [Wait: {seconds: 1}, Wait: {seconds: 2}]}}"))
-    assert call("tree", path).stdout.splitlines()[0] == "race  (head_start: 0.5)"
-    xml = call("tree", path, "--format", "btcpp").stdout
+    assert invoke("tree", path).stdout.splitlines()[0] == "race  (head_start: 0.5)"
+    xml = invoke("tree", path, "--format", "btcpp").stdout
     assert '<race head_start="0.5">' in xml and '<Control ID="race">' in xml
 
 
@@ -152,7 +147,7 @@ def test_the_first_branch_that_succeeds_halts_the_others(project: Path) -> None:
 
 def test_a_failure_that_it_passes_on_is_explained(project: Path) -> None:
     path = write("{race: [{invert: {Wait: {seconds: 0.1}}}, {invert: {Wait: {seconds: 0.2}}}]}")
-    result = call("run", str(path), "--set", "cell.kind=fake", "--runs", "runs")
+    result = invoke("run", str(path), "--set", "cell.kind=fake", "--runs", "runs")
     assert result.exit_code == 1, result.output
     assert "none of the 2 branches succeeded" in result.output
 
@@ -170,6 +165,6 @@ def test_a_failure_that_it_passes_on_is_explained(project: Path) -> None:
 )
 def test_a_broken_class_is_one_clear_message(project: Path, source: str, message: str) -> None:
     Path("arena/race.py").write_text(source, encoding="utf-8")
-    result = call("check", str(write("{Wait: {seconds: 1}}")))
+    result = invoke("check", str(write("{Wait: {seconds: 1}}")))
     assert result.exit_code == 2
     assert message in result.output

@@ -11,10 +11,9 @@ import av
 import numpy as np
 import PIL.Image
 import pytest
-from click.testing import CliRunner, Result
+from at_terminal import invoke
 from numpy.typing import NDArray
 
-from executive.cli.main import main
 from executive.cli.shared import check_video
 from executive.errors import InputError
 from executive.record.journal import read_journal
@@ -25,10 +24,6 @@ cell: cells/overhead.yaml
 routes: {cube: red_bin, sphere: blue_bin, duck: yellow_bin}
 tree: [Detect, Localize, SelectTarget, {MoveToScan: {pose: aside}}]
 """
-
-
-def invoke(*words: object) -> Result:
-    return CliRunner().invoke(main, [str(word) for word in words])
 
 
 @pytest.fixture(scope="module")
