@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from executive.cell.arm import Goal, Motion, Task
 from executive.cell.objects import Target
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
@@ -24,6 +25,14 @@ def pick(fake: FakeCell, target: Target) -> str:
     """Grasp an object that was localized; return its item."""
     run_skill(Approach(target=target), fake)
     return run_skill(Grasp(target=target), fake).outputs["held"]
+
+
+def plan_motion(fake: FakeCell, goal: Goal | str, task: Task = Task()) -> Motion:
+    """Return a motion of the arm, once it is planned."""
+    planning = fake.cell.arm.plan(goal, task)
+    while not planning.ready:
+        fake.advance()
+    return planning.result()
 
 
 def intercept(fake: FakeCell, path: str, answer: Callable[..., Any]) -> None:

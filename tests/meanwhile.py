@@ -33,13 +33,17 @@ def meanwhile(
         act: Changes the world; the arm is at rest before, and what was moved comes to rest after.
         kind: Makes the station, with a fake or a simulated world.
     """
-    options = CellOptions(SilentOperator(), cell_folder=loaded.cell_path.parent, world_log=log)
-    cell = kind(loaded.cell_config, seed=seed, routes=loaded.routes, emit=discard_event, options=options)
-    with closing(cell):
+    with closing(rebuild(log, loaded, seed, kind)) as cell:
         world = WorldAccess(cell)
         settle(cell)
         act(world)
         settle(cell)
+
+
+def rebuild(log: Path, loaded: LoadedMission, seed: int, kind: Callable[..., Station]) -> Station:
+    """Return the station of a run that was cut off, its world as the log says."""
+    options = CellOptions(SilentOperator(), cell_folder=loaded.cell_path.parent, world_log=log)
+    return kind(loaded.cell_config, seed=seed, routes=loaded.routes, emit=discard_event, options=options)
 
 
 def settle(cell: Station) -> None:

@@ -12,7 +12,7 @@ from guide_blocks import blocks
 from py_trees.blackboard import Blackboard
 
 from executive.behaviours import load_skills
-from executive.errors import InputError, Interrupted
+from executive.errors import InputError
 from executive.events import NodeEnded, TimedEvent
 from executive.mission.load import load_mission
 from executive.record.journal import read_journal
@@ -24,6 +24,7 @@ from executive.run.assembly import RunOptions
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_mission import MissionResult, run_mission
 from executive.text.findings import MissionError
+from tests.cut_off import Cut, Cutter
 
 PROJECT = """\
 [project]
@@ -137,24 +138,6 @@ def test_ports_are_checked(tree: str, place: str, code: str, write: Write) -> No
     assert (place, code) in found, str(caught.value)
 
 
-class Cut(Interrupted):
-    """End a run like a kill."""
-
-
-class Cutter:
-    """A view that ends the run in the 40th control step."""
-
-    def open(self, run: object) -> None:
-        pass
-
-    def __call__(self, timed: TimedEvent) -> None:
-        if timed.tick >= 40:
-            raise Cut
-
-    def close(self) -> None:
-        pass
-
-
 def record(path: Path, *views: Cutter) -> Path:
     loaded = load_mission(path, load_skills())
     with suppress(Cut):
@@ -175,14 +158,14 @@ def test_a_replay_executes_no_behaviour(write: Write, monkeypatch: pytest.Monkey
 
 
 def test_an_interrupted_run_continues_with_its_blackboard(write: Write) -> None:
-    run = record(write(COUNT), Cutter())
+    run = record(write(COUNT), Cutter(40))
     assert resume(run).status == "SUCCESS"
     ends = find_ends(list(read_journal(run / "journal.jsonl")))
     assert ends.count(("Tally", "SUCCESS")) == 3, "the count goes on where it was"
 
 
 def test_a_value_that_json_cannot_restore_prevents_a_resumption(write: Write) -> None:
-    run = record(write("  - PyTree: {class: foreign:Keep}\n  - Wait: {seconds: 1}\n"), Cutter())
+    run = record(write("  - PyTree: {class: foreign:Keep}\n  - Wait: {seconds: 1}\n"), Cutter(40))
     with pytest.raises(InputError, match=r'"/kept" \(Status\)'):
         resume(run)
 

@@ -29,11 +29,7 @@ from coverage import CoverageData
 
 ROOT = Path(__file__).parents[2]
 
-EXCLUDED_FOLDERS = (
-    "executive/cli/setup",
-    "executive/view/live",
-    "executive/training",
-)
+EXCLUDED_FOLDERS = ("executive/cli/setup", "executive/view/live", "executive/training")
 """Code that slow tests cover: projects in processes of their own, browsers, training."""
 
 MAX_SELECTED_TESTS = 400

@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 import pytest
+from at_hand import plan_motion
 
-from executive.cell.arm import Goal, Motion, Task
+from executive.cell.arm import Goal, Task
 from executive.cell.device_config import STEP
 from executive.cell.objects import BIN_THICKNESS, Obstacle
 from executive.errors import Blocked, Unreachable
@@ -17,13 +18,6 @@ from executive.testing.fake_cell import FakeCell, load_empty_cell
 
 ASIDE = np.radians(load_empty_cell().arm.poses_deg["aside"])
 BESIDE = Goal((0.5, 0.2, 0.03), guarded_length=0.02, guarded_speed=0.05)
-
-
-def plan_motion(fake: FakeCell, goal: Goal | str, task: Task = Task()) -> Motion:
-    planning = fake.cell.arm.plan(goal, task)
-    while not planning.ready:
-        fake.advance()
-    return planning.result()
 
 
 def move(fake: FakeCell, goal: Goal | str, task: Task = Task()) -> tuple[Array, Array]:

@@ -85,9 +85,7 @@ def test_a_dropped_item_is_recognized_where_it_lies(bench: Bench) -> None:
     assert [(t.item, t.position[0]) for t in found] == [("cube-1", 0.30), ("cube-2", pytest.approx(0.6))]
 
 
-def test_one_object_more_in_a_bin_of_its_class_than_was_let_go_there_is_the_dropped_one(
-    bench: Bench,
-) -> None:
+def test_one_object_more_in_a_bin_of_its_class_than_was_let_go_there_is_the_dropped_one(bench: Bench) -> None:
     bench.look(("cube", 0.45, 0.0))
     bench.place("cube-1")
     bench.look(("cube", 0.60, 0.0))

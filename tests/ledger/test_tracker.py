@@ -84,8 +84,7 @@ def test_objects_that_the_mission_has_no_route_for_are_nothing_left_to_sort(benc
 
 
 @pytest.mark.parametrize(
-    ("completed", "attempts", "final"),
-    [(True, 0, "skipped"), (True, 1, "rejected"), (False, 0, "rejected")],
+    ("completed", "attempts", "final"), [(True, 0, "skipped"), (True, 1, "rejected"), (False, 0, "rejected")]
 )
 def test_an_item_is_skipped_only_if_the_mission_was_completed_without_an_attempt_at_it(
     bench: Bench, completed: bool, attempts: int, final: str

@@ -70,16 +70,8 @@ def test_there_is_no_line_up_where_the_tool_does_not_point_down_or_a_joint_leave
 @pytest.mark.parametrize(
     ("place", "length", "text"),
     [
-        (
-            (0.9, 0.0, 0.114),
-            0.0,
-            r"(0.900, 0.000, 0.114) m: .* 0\.080 m beyond the reach of the arm",
-        ),
-        (
-            (0.3, 0.0, 0.114),
-            0.0,
-            r"(0.300, 0.000, 0.114) m: .* 0\.110 m nearer than joint 4 permits",
-        ),
+        ((0.9, 0.0, 0.114), 0.0, r"(0.900, 0.000, 0.114) m: .* 0\.080 m beyond the reach of the arm"),
+        ((0.3, 0.0, 0.114), 0.0, r"(0.300, 0.000, 0.114) m: .* 0\.110 m nearer than joint 4 permits"),
         ((0.5, 0.0, 0.05), 0.9, r"(0.500, 0.000, 0.950) m: .* beyond the reach"),
         ((0.5, 0.0, 0.1), 0.0, r"(0.500, 0.000, 0.100) m: .* leaves joint 6 14\.1° outside ±20°"),
     ],

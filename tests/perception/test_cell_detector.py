@@ -174,11 +174,7 @@ def test_a_box_that_cannot_show_an_object_in_the_image_is_an_error(box: Any) -> 
             Unavailable,
             r"detector eye returned an invalid box: 'cube' 1.5 at \(0.0, 0.0, 9.0, 9.0\) .* 20 x 20",
         ),
-        (
-            [find()] * (MAX_BOXES + 1),
-            Crowded,
-            "detector eye found 61 boxes in the view full, .* at most 60",
-        ),
+        ([find()] * (MAX_BOXES + 1), Crowded, "detector eye found 61 boxes in the view full, .* at most 60"),
     ],
 )
 def test_an_unusable_answer_names_the_detector(

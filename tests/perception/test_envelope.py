@@ -75,11 +75,6 @@ def test_a_frame_within_the_tolerance_of_the_range_is_no_difference_and_a_darker
 
 
 @pytest.fixture
-def overhead(missions):
-    return load_cell(missions / "cells" / "overhead.yaml")
-
-
-@pytest.fixture
 def stored(tmp_path, overhead):
     """A folder with a measurement of the cell overhead."""
     one = Measurement(

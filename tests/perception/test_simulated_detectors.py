@@ -29,11 +29,7 @@ def answers(seed=1, view="table", **errors):
     none = {"miss_rate": 1e-9, "confusion_rate": 1e-9, "false_detections": 1e-9, "jitter": 1e-9}
     config = DetectorConfig(kind="noisy", of="known", classes=list(CLASSES), **{**none, **errors})
     context = DetectorContext(
-        "noisy",
-        SimpleNamespace(get_view_box=lambda view: VIEWS[view]),
-        Path(),
-        seed,
-        lambda name: KNOWN,
+        "noisy", SimpleNamespace(get_view_box=lambda view: VIEWS[view]), Path(), seed, lambda name: KNOWN
     )
     detector = NoisyDetector.from_config(config, context)
     frames = [SimpleNamespace(id=number, image=np.zeros((480, 640, 3))) for number in range(LOOKS)]

@@ -190,10 +190,7 @@ HALTED = '{"kind": "RunHalted", "tick": 1, "clock": 0.1, "is_tree_ticked": true}
         (HALTED.replace("0.1", "3.0").encode(), '"tick" 1 and "clock" 3.0 contradict'),
         (encode_event(at(1, read("clock", "now"))), "the clock is 'now'"),
         (encode_event(at(1, skill_ended("a"))).replace(b"SUCC", b"ODDN"), '"status" of NodeEnded'),
-        (
-            encode_event(at(0, run_started())).replace(b'"format":4', b'"format":2'),
-            '"format" of RunStarted',
-        ),
+        (encode_event(at(0, run_started())).replace(b'"format":4', b'"format":2'), '"format" of RunStarted'),
     ],
 )
 def test_a_line_that_is_no_event_is_an_error_with_its_number(path, line, why):
@@ -216,8 +213,7 @@ def test_inputs_of_an_earlier_format_are_read_as_they_are(path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("kinds", "ended"),
-    [("", False), ("run node end", True), ("run end resume node", False)],
+    ("kinds", "ended"), [("", False), ("run node end", True), ("run end resume node", False)]
 )
 def test_a_run_has_ended_if_nothing_comes_after_its_end(kinds, ended):
     samples = {"run": run_started(), "node": NODE, "end": END, "resume": RunResumed(1, "", {})}

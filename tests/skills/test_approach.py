@@ -76,9 +76,7 @@ def parts() -> FakeCell:
     return FakeCell(config.model_copy(update={"objects": objects}))
 
 
-def test_further_attempts_go_round_the_ring(
-    parts: FakeCell,
-) -> None:
+def test_further_attempts_go_round_the_ring(parts: FakeCell) -> None:
     parts.world.put("cube", 0.5, 0.0)
     steps = []
     for _ in range(5):
@@ -92,9 +90,7 @@ def test_further_attempts_go_round_the_ring(
     assert math.radians(30) < gaps.min() <= gaps.max() < math.radians(150)
 
 
-def test_nothing_is_felt_for_below_the_middle_of_a_thin_part(
-    parts: FakeCell,
-) -> None:
+def test_nothing_is_felt_for_below_the_middle_of_a_thin_part(parts: FakeCell) -> None:
     parts.world.put("duck", 0.5, 0.0)
     (target,) = look(parts)
     parts.world.objects.clear()

@@ -5,21 +5,15 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from at_hand import plan_motion
 
-from executive.cell.arm import Goal, Motion
+from executive.cell.arm import Goal
 from executive.errors import Fault
 from executive.events import Event, MotionPlanned
 from executive.testing.fake_cell import FakeCell, load_empty_cell
 
 LATENCY = load_empty_cell().motion.planning_time
 BESIDE = Goal((0.5, 0.2, 0.03), guarded_length=0.02, guarded_speed=0.05)
-
-
-def plan_motion(fake: FakeCell, goal: Goal | str) -> Motion:
-    planning = fake.cell.arm.plan(goal)
-    while not planning.ready:
-        fake.advance()
-    return planning.result()
 
 
 def test_a_plan_takes_its_time_unless_it_was_asked_for_before() -> None:

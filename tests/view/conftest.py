@@ -11,12 +11,12 @@ from typing import Any
 import pytest
 
 from executive.behaviours import load_skills
-from executive.errors import Interrupted
 from executive.mission.load import load_mission
 from executive.record.recorded_run import record_run
 from executive.record.run_directory import find_run
 from executive.run.assembly import RunOptions
 from executive.testing.fake_cell import FakeCell
+from tests.cut_off import Cut
 
 MISSION = """\
 mission: trial
@@ -35,10 +35,6 @@ tree:
       recover: [Detect, Localize, {SelectTarget: {same: $item}}]
       do: [Approach, Grasp, Transit, Release]
 """
-
-
-class Cut(Interrupted):
-    """Ends a run as a kill does, but for what Python itself closes."""
 
 
 class Leaky(FakeCell):

@@ -57,10 +57,7 @@ def test_a_box_in_each_format_lies_on_the_table_as_declared(visual: str, tmp_pat
 
 @pytest.mark.parametrize(
     ("name", "content", "reason"),
-    [
-        ("p.stl", BINARY_STL[:400], "it has no faces"),
-        ("p.dae", b"<COLLADA>nan</COLLADA>", "NaN"),
-    ],
+    [("p.stl", BINARY_STL[:400], "it has no faces"), ("p.dae", b"<COLLADA>nan</COLLADA>", "NaN")],
 )
 def test_a_broken_mesh_is_refused(name: str, content: bytes, reason: str, tmp_path: Path) -> None:
     (tmp_path / name).write_bytes(content)

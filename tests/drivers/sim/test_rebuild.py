@@ -12,22 +12,18 @@ import pytest
 from executive.behaviours import load_skills
 from executive.cell.device_config import STEP
 from executive.drivers.sim.driver import SimDriver
-from executive.errors import InputError, Interrupted
-from executive.events import discard_event
+from executive.errors import InputError
 from executive.mission.load import load_mission
 from executive.motion.joints import JointLimits
 from executive.motion.trajectory import Trajectory
 from executive.run.assembly import RunOptions, assemble
-from executive.station.station import CellOptions, SilentOperator, Station
+from executive.station.station import Station
 from executive.testing.oracle import WorldAccess, make_oracle_kind
-from tests.meanwhile import meanwhile
+from tests.cut_off import Cut
+from tests.meanwhile import meanwhile, rebuild
 
 SEED = 3
 TICKS = (1, 400, 777)
-
-
-class Cut(Interrupted):
-    """Ends a run as a kill does: nothing is cleaned up."""
 
 
 @dataclass(frozen=True)
@@ -91,10 +87,7 @@ def left(mission, tmp_path_factory: pytest.TempPathFactory) -> list[Left]:
 
 
 def rebuilt(mission, log: Path) -> Station:
-    options = CellOptions(SilentOperator(), cell_folder=mission.cell_path.parent, world_log=log)
-    return make_oracle_kind()(
-        mission.cell_config, seed=SEED, routes=mission.routes, emit=discard_event, options=options
-    )
+    return rebuild(log, mission, SEED, make_oracle_kind())
 
 
 @pytest.fixture

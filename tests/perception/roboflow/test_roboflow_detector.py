@@ -15,6 +15,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from stub_server import BODIES, FLOODS, MODEL, SPOILT, WORKFLOW, StubServer
+from test_helper import SECRET, list_children
 
 from executive.cell.config import DetectorConfig
 from executive.errors import DeadlinePassed, Unavailable
@@ -22,7 +23,6 @@ from executive.perception.detectors.detector_registry import DetectorContext
 from executive.perception.detectors.roboflow.detector import RoboflowDetector
 from tests.benchmarks.hostile_input import damage_text
 
-SECRET = "SECRET1234567890"
 DEADLINE = 2.0
 """Time for an answer [s]: more than inference-sdk takes for the three times that it asks."""
 V1 = {"api": "v1", "class_map": {"ball": "sphere"}}
@@ -240,9 +240,6 @@ def test_an_address_key_or_output_that_does_not_work_is_said(make, server, optio
 
 
 def test_closing_does_not_wait_for_a_server_that_hangs(server):
-    def list_children():
-        return Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
-
     before = list_children()
     detector = build("closing", url=server.url, deadline=60.0)
     assert len(list_children()) == len(before) + 1
