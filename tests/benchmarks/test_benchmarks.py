@@ -52,8 +52,8 @@ def test_every_end_of_a_child_is_reported(function: Any, answer: tuple[Any, str]
 
 
 def test_halts_of_a_fake_cell_are_in_order_and_a_wrong_ledger_is_found() -> None:
-    figures = halts.measure(load(), every=150)
-    assert (figures["problems"], figures["halts"]) == ([], -(-figures["ticks"] // 150))
+    figures = halts.measure(load(), every=300)
+    assert (figures["problems"], figures["halts"]) == ([], -(-figures["ticks"] // 300))
     items = {"seen": 4, "placed": 1, "rejected": 1, "skipped": 1, "lost": 1}
     audit = {"right": 1, "wrong_bin": 0, "left": 3, "elsewhere": 1, "unseen": 1}
     assert list(halts.check_ledger(items, audit)) == []

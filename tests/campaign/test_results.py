@@ -152,10 +152,7 @@ def test_another_file_is_refused(content: str | None, message: str, tmp_path: Pa
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_a_damaged_database_is_read_or_refused(
-    seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("executive.campaign.results.MAX_ROW_COUNT", 1000)
+def test_a_damaged_database_is_read_or_refused(seed: int, tmp_path: Path) -> None:
     with closing(ResultsDatabase(tmp_path / FILE_NAME, SETTINGS)) as database:
         database.append(RECORD)
     damage_database(Random(seed), tmp_path / FILE_NAME)
