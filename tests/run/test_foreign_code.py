@@ -111,7 +111,6 @@ def test_every_odd_end_at_every_place_is_a_fault(place: str, effect: str, run_wi
     ("message", "text"),
     [
         (0.31, "0.31"),
-        (None, "None"),
         (odd_parts.Silent(), "a Silent without text"),
         ("far " * 2_500_000, "far far"),
         (b"\xff", "b'\\xff'"),
