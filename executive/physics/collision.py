@@ -5,7 +5,6 @@ The check uses a separate world, because moving the arm of the running world wou
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Sequence
 from operator import attrgetter
@@ -25,6 +24,8 @@ ROUNDING_ERROR = 1e-5
 """Maximum rounding error of a distance [m]."""
 SEARCH_DISTANCE = 0.1
 """Distances that exceed the margin by more than this value are not computed [m]."""
+MAX_CYLINDER_COUNT = 300
+"""Number of stored cylinders above which all are removed; each needs 10 kB."""
 JOINT_AXIS = 13
 """Index of the axis of the joint in the information about a joint of PyBullet."""
 SUPPORT_TOLERANCE = 0.001
@@ -91,8 +92,8 @@ class ClearanceChecker:
     def __init__(self, config: CellConfig) -> None:
         self.world = CellWorld(config, visuals=False)
         self._margin = config.motion.margin
-        self._get_cylinder = functools.cache(self._add_cylinder)
-        """Returns the body of the load (number 0) or of an obstacle, by radius [m], height [m] and number."""
+        self._cylinders: dict[tuple[float, float, int], int] = {}
+        """Body of the load (number 0) or of an obstacle, by radius [m], height [m] and number."""
         # The function is looked up once, because a look-up takes as long as a call.
         self._get_closest_points = self.world.client.getClosestPoints
         self._radii = self._compute_max_radii()
@@ -233,6 +234,10 @@ class ClearanceChecker:
 
     def _place_obstacles(self, obstacles: Sequence[Obstacle]) -> list[tuple[str, int]]:
         """Represent the obstacles by cylinders on the table; return name and body of each obstacle."""
+        if len(self._cylinders) > MAX_CYLINDER_COUNT:
+            for body in self._cylinders.values():
+                self.world.client.removeBody(body)
+            self._cylinders.clear()
         placed_obstacles = []
         for number, obstacle in enumerate(obstacles, 1):
             body = self._get_cylinder(round(obstacle.radius, 4), round(obstacle.top, 4), number)
@@ -241,9 +246,11 @@ class ClearanceChecker:
             placed_obstacles.append((obstacle.name, body))
         return placed_obstacles
 
-    def _add_cylinder(self, radius: float, height: float, number: int) -> int:
-        """Add a cylinder and return the body; `number` distinguishes cylinders of equal size in the cache."""
-        del number
-        client = self.world.client
-        shape = client.createCollisionShape(pybullet.GEOM_CYLINDER, radius=radius, height=height)
-        return int(client.createMultiBody(0, shape))
+    def _get_cylinder(self, radius: float, height: float, number: int) -> int:
+        """Return the body of a cylinder; `number` distinguishes cylinders of equal size."""
+        key = (radius, height, number)
+        if key not in self._cylinders:
+            client = self.world.client
+            shape = client.createCollisionShape(pybullet.GEOM_CYLINDER, radius=radius, height=height)
+            self._cylinders[key] = int(client.createMultiBody(0, shape))
+        return self._cylinders[key]

@@ -21,6 +21,8 @@ from executive.motion.configurations import find_configuration_pairs
 from executive.motion.joints import Kinematics
 from executive.processes import shut_down, wait_until_done
 
+MAX_STORED_ANSWERS = 1000
+"""Number of stored answers about goals above which all are removed."""
 DIFFERENTIATION_STEP = 1e-4
 """Time step of the numerical derivative of the tool position [s]."""
 
@@ -187,6 +189,8 @@ class PlannedArm:
         """Return a sentence if no configuration reaches a goal and the start of its descent, else ""."""
         # The answer is computed once per goal, because a `guard` of the tree may ask in every tick.
         if goal not in self._reach_problems:
+            if len(self._reach_problems) > MAX_STORED_ANSWERS:
+                self._reach_problems.clear()
             try:
                 q_start = np.zeros_like(self._kinematics.joint_range.lower)
                 find_configuration_pairs(self._kinematics, goal, goal.guarded_length, q_start)
