@@ -101,7 +101,7 @@ def test_a_killed_run_continues_with_the_objects_that_are_left(project: Path, im
     assert run_lab().exit_code == 0
     run = Path("runs/latest").resolve()
     lines = (run / "journal.jsonl").read_text().splitlines(keepends=True)
-    kept = next(number for number, line in enumerate(lines) if '"state": "placed"' in line)
+    kept = next(number for number, line in enumerate(lines) if '"state":"placed"' in line)
     (run / "journal.jsonl").write_text("".join(lines[: kept + 1]))
     (run / "result.json").unlink()
     np.save("images.npy", images[1:])
