@@ -151,7 +151,9 @@ def test_another_file_is_refused(content: str | None, message: str, tmp_path: Pa
         ResultsDatabase(tmp_path / "file")
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize(
+    "seed", [*range(8), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(8, 40))]
+)
 def test_a_damaged_database_is_read_or_refused(seed: int, tmp_path: Path) -> None:
     with closing(ResultsDatabase(tmp_path / FILE_NAME, SETTINGS)) as database:
         database.append(RECORD)

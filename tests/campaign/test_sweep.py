@@ -102,6 +102,7 @@ def end_with_parent(number: signal.Signals) -> str:
     return "never returned"
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("signals")
 def test_a_job_whose_process_was_ended_with_this_one_has_no_result() -> None:
     assert run_jobs([signal.SIGTERM] * 2, end_with_parent, describe_fault, JobOptions(1)) == [None, None]

@@ -68,6 +68,7 @@ def test_a_cell_that_does_not_exist_is_refused(wait: Path, command: str) -> None
     )
 
 
+@pytest.mark.slow
 def test_a_sweep_runs_on_the_other_cell(wait: Path) -> None:
     swept = invoke("sweep", "wait.yaml", "--seeds", "1", "--workers", "1", "--cell", "fruit", "--json")
     result = json.loads(swept.stdout)

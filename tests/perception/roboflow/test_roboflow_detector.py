@@ -189,7 +189,10 @@ def test_50_random_answers_are_bounded(make, server, api):
         assert measure_helper(detector) < 500, fault
 
 
-@pytest.mark.parametrize("fault", ["bomb", "oversized", "chunks", "redirect"])
+@pytest.mark.parametrize(
+    "fault",
+    ["oversized", "redirect", *(pytest.param(each, marks=pytest.mark.slow) for each in ("bomb", "chunks"))],
+)
 def test_a_bounded_part_of_an_answer_is_read_and_only_from_the_server(make, server, fault):
     server.faults = lambda look: fault
     problem = r"ValueError: (a redirect to http://127.0.0.1:9/|an answer of more than 8388608 bytes)"
