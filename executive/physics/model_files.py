@@ -311,7 +311,8 @@ def read_mesh(path: Path, max_triangle_count: float = MAX_TRIANGLE_COUNT) -> Tri
     if len(faces) > max_triangle_count:
         problem = f"the model {path.name} has more than {max_triangle_count} triangles"
         raise InputError(f"{problem}; simplify the mesh")
-    if suffix == ".obj":
+    # The import of Pillow takes 0.1 s, for which the check of shipped models must not wait.
+    if suffix == ".obj" and not is_shipped(path):
         for material in list_named_files(path):
             if material.suffix.lower() != ".mtl":
                 raise InputError(f"the model {path.name} names {material.name}, which is no .mtl file")
