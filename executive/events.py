@@ -214,6 +214,27 @@ class ItemChanged(Event):
 
 
 @dataclass(frozen=True)
+class UnexplainedChanged(Event):
+    """The ledger found, found again or explained what images or sensors show and no item explains.
+
+    Attributes:
+        name: Name, unique in the run, for instance `unexplained-1`.
+        text: Sentence that describes it.
+        position: Position `(3,)` [m]; empty if it has none.
+        frame: Number of the last frame that shows it; 0 for none.
+        box: Left, top, right and bottom side in the frame [pixel]; empty without a frame.
+        is_open: False after an explanation was found, or after it disappeared.
+    """
+
+    name: str
+    text: str
+    position: Sequence[float]
+    frame: int = 0
+    box: Sequence[float] = ()
+    is_open: bool = True
+
+
+@dataclass(frozen=True)
 class BinsEmptied(Event):
     """A person, a skill or a program declared that bins have been emptied.
 

@@ -178,6 +178,21 @@ class Detection:
 
 
 @dataclass(frozen=True, eq=False)
+class Region:
+    """A region of an image that shows neither the empty table nor a known object.
+
+    Attributes:
+        box: Bounding box of the region in the image [pixel].
+        position: Centre of the region on the table `(3,)` [m].
+        text: Sentence that describes the region.
+    """
+
+    box: Box
+    position: Array
+    text: str
+
+
+@dataclass(frozen=True, eq=False)
 class TrueFrame(Frame):
     """A frame of a fake or simulated world with ground truth.
 

@@ -22,6 +22,7 @@ from executive.ledger.certainty import FINAL_STATES, Certainty, discard_moved_it
 from executive.ledger.coverage import Coverage
 from executive.ledger.item import ON_TABLE, ItemRecord, ItemRecords, State
 from executive.ledger.look import AMBIGUITY_FACTOR, LookUpdate, make_look_event
+from executive.ledger.unexplained import Unexplained
 from executive.perception import evidence
 
 BODY_LOOK_COUNT = 5
@@ -52,6 +53,7 @@ class Tracker:
             frame.
         ignored_positions: Positions `(3,)` [m] of all detections with an ignored label so far.
         empty_load: Load of the empty tool before the last approach [N].
+        unexplained: All that images or sensors show and no item explains.
         assumption_reasons: Reasons why error rates of detectors were assumed, and not measured.
     """
 
@@ -81,6 +83,7 @@ class Tracker:
         self._last_stamp = 0.0
         """Capture time of the last look [s]."""
         self.empty_load = 0.0
+        self.unexplained = Unexplained(self.emit)
         self.assumption_reasons: list[str] = []
 
     def observe(self, detections: Detections, observations: Sequence[Observation]) -> Sequence[Target]:

@@ -68,7 +68,8 @@ class PictureRecorder:
     `<tick>_<item>.jpg` shows the image in which an item was selected. After a failed attempt to pick an item,
     `<tick>_<item>_<reason>.jpg` shows the image in which the item was selected last. After the failure of a
     skill without an item, `<tick>_<reason>.jpg` shows the last image, unless another picture shows it. At the
-    end of the run, `<tick>_<item>.jpg` shows the last image of each rejected item of no class.
+    end of the run, `<tick>_<item>.jpg` shows the last image of each rejected item of no class. What no item
+    explains is in a picture `<tick>_<name>.jpg`.
 
     Args:
         folder: Folder of the pictures.
@@ -88,6 +89,8 @@ class PictureRecorder:
         self._selected_frame_id: int | None = None
         self._undrawn_frame_id: int | None = None
         """Number of the frame of the last look; None if a picture shows this frame."""
+        self._unexplained_names: set[str] = set()
+        """Names of all that no item explains and that a picture shows."""
         self._files: deque[Path] = deque()
         self.problem = ""
         """Message about the first missing picture, or ""."""
@@ -110,6 +113,8 @@ class PictureRecorder:
                 look = self._timeline.items.histories[name].look
                 if last.state == "rejected" and look and last.label in self._unknown_labels:
                     self._queue(timed, TargetSelected(name, last.label, look.frame, ""), None)
+        elif isinstance(event, events.UnexplainedChanged) and event.is_open and event.frame:
+            self._draw_unexplained(timed, event)
         if isinstance(event, events.ItemChanged | events.BinsEmptied | FrameSearched | TargetSelected):
             self._timeline(timed)
 
@@ -128,6 +133,17 @@ class PictureRecorder:
             # The look of the last selection is kept for the picture of a failed attempt to pick the item.
             other_ids = (id for id in self._look_by_frame_id if id != self._selected_frame_id)
             del self._look_by_frame_id[next(other_ids)]
+
+    def _draw_unexplained(self, timed: TimedEvent, event: events.UnexplainedChanged) -> None:
+        """Queue a picture of what no item explains, when the first frame shows it."""
+        frame = self._last_frame
+        if event.name in self._unexplained_names or frame is None or frame.id != event.frame:
+            return
+        self._unexplained_names.add(event.name)
+        shown = [DetectedObject("", 0.0, event.box, [0.0] * 3, "")] if event.box else []
+        caption = _make_caption(timed.clock, frame, None, None) + event.text
+        picture = PictureContent(frame.image, shown, 0 if shown else None, event.name, (), caption)
+        self._thread.submit(self._save, self._folder / f"{timed.tick:06d}_{event.name}.jpg", picture)
 
     def _queue(self, timed: TimedEvent, selection: TargetSelected | None, failure: NodeEnded | None) -> None:
         """Queue a picture of the frame of the selection; without a selection, of the last undrawn frame."""
@@ -202,7 +218,7 @@ def draw_picture(picture: PictureContent) -> NDArray[np.uint8]:
         colour = _choose_colour(detection.label, picture.classes)
         line_width = SELECTED_LINE_WIDTH if is_selected else LINE_WIDTH
         cv2.rectangle(canvas, (left, top), (right, bottom), colour, line_width)
-        label = f"{name} {detection.confidence:.2f}"
+        label = f"{name} {detection.confidence:.2f}" if detection.label else name
         (label_width, label_height), _ = cv2.getTextSize(label, _FONT, _TEXT_SCALE, 1)
         baseline = max(top - 3, label_height + 2)
         label_region = (left, baseline - label_height - 2, label_width, label_height + 5)

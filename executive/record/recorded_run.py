@@ -15,12 +15,21 @@ import yaml
 
 from executive.cell.devices import find_driver_options
 from executive.errors import ExecutiveError, InputError, Interrupted, describe_error
-from executive.events import Observer, TimedEvent
+from executive.events import Observer, TimedEvent, UnexplainedChanged
 from executive.mission.load import LoadedMission
 from executive.mission.outline import make_outline
 from executive.record.diagnose import diagnose
 from executive.record.journal import Recorder
-from executive.record.result import Audit, ItemCounts, Result, is_resumable, list_requests, write_result
+from executive.record.picture_recorder import find_picture
+from executive.record.result import (
+    Audit,
+    ItemCounts,
+    Result,
+    UnexplainedEntry,
+    is_resumable,
+    list_requests,
+    write_result,
+)
 from executive.record.run_directory import RunDirectory, format_tree, make_dated_folder
 from executive.record.timeline import Timeline
 from executive.run.assembly import RunOptions, assemble
@@ -211,6 +220,7 @@ def execute_recorded(
         items=ItemCounts(**item_counts),
         unknown_labels=station.ledger.unknown_labels,
         assumption_reasons=station.ledger.assumption_reasons,
+        unexplained=[_make_entry(event, recorder.directory) for event in timeline.unexplained.values()],
         audit=None if audit is None else Audit.from_counts(item_counts, audit, run_end.is_table_empty),
         planning=timeline.planning,
         requests=list_requests(timeline),
@@ -230,3 +240,10 @@ def execute_recorded(
     for view in options.views if problems else ():
         view.show_message("; ".join(problems))
     return result
+
+
+def _make_entry(event: UnexplainedChanged, directory: RunDirectory) -> UnexplainedEntry:
+    """Return the entry of the result about an event, with the path of its picture."""
+    picture = find_picture(directory.pictures, event.name, "")
+    file = "" if picture is None else f"{picture.parent.name}/{picture.name}"
+    return UnexplainedEntry(event.name, event.text, event.position, file)

@@ -87,6 +87,23 @@ class Audit:
 
 
 @dataclass(frozen=True)
+class UnexplainedEntry:
+    """What images or sensors show, and no item explains.
+
+    Attributes:
+        name: Name, for instance `unexplained-1`.
+        text: Sentence that describes it.
+        position: Position `(3,)` [m]; empty if it has none.
+        picture: File of its picture, relative to the run directory, or "".
+    """
+
+    name: str
+    text: str
+    position: Sequence[float]
+    picture: str
+
+
+@dataclass(frozen=True)
 class FailureNode:
     """Node that determined the status of a run, or control node that did not handle its failure.
 
@@ -162,6 +179,7 @@ class Result:
         items: Number of items by final state, from the ledger.
         unknown_labels: Maximum number of boxes in one frame, by label that the cell file does not declare.
         assumption_reasons: Reasons for which error rates of detectors were assumed.
+        unexplained: What images or sensors show, and no item explains.
         audit: True places of the objects, compared with `items`; None in a cell without ground truth.
         planning: Number of planned motions, and time for which skills waited for plans.
         requests: Requests of the operator, in order; a scripted operator repeats the run with them.
@@ -182,6 +200,7 @@ class Result:
     items: ItemCounts = field(default_factory=ItemCounts)
     unknown_labels: Mapping[str, int] = field(default_factory=dict)
     assumption_reasons: Sequence[str] = ()
+    unexplained: Sequence[UnexplainedEntry] = ()
     is_table_empty: bool = False
     audit: Audit | None = None
     planning: PlanningTotals = field(default_factory=PlanningTotals)

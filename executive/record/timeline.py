@@ -223,6 +223,7 @@ class Timeline:
         planning: Statistics of motion planning.
         question: Question to the operator that is not yet answered, or None.
         requests: Requests of the operator; None for the request to quit.
+        unexplained: What no item explains, by its name, the last shown last.
         faults: Time [s] and name of each injected fault.
         traceback: Traceback of the exception that ended the run, or "".
     """
@@ -244,6 +245,7 @@ class Timeline:
     planning: PlanningTotals = field(default_factory=PlanningTotals)
     question: events.OperatorAsked | None = None
     requests: list[str | None] = field(default_factory=list)
+    unexplained: dict[str, events.UnexplainedChanged] = field(default_factory=dict)
     faults: list[tuple[float, str]] = field(default_factory=list)
     traceback: str = ""
     _activation_count: int = 0
@@ -289,6 +291,10 @@ class Timeline:
             case events.RequestGiven():
                 self.question = None
                 self.requests.append(event.request)
+            case events.UnexplainedChanged():
+                self.unexplained.pop(event.name, None)
+                if event.is_open:
+                    self.unexplained[event.name] = event
             case events.FaultInjected():
                 self.faults.append((self.clock, event.name))
             case events.FaultRaised():

@@ -300,7 +300,8 @@ class Run:
     def _store_final_state(self) -> None:
         """Store the state of the table from the ledger, then the state of the tool, whose sensor may fail."""
         ledger = self.cell.ledger
-        self._is_table_empty = ledger.is_table_empty() and not ledger.unknown_labels
+        has_unknown = ledger.unknown_labels or self.station.ledger.unexplained.events
+        self._is_table_empty = ledger.is_table_empty() and not has_unknown
         if self.cell.tool.holding:
             self._held_item = ledger.find_held_item() or "something"
 
@@ -319,7 +320,8 @@ def _catch_problems(action: Callable[[], None]) -> list[str]:
 def _check_items(ledger: Tracker) -> _LoopEnd:
     """Return the end of a run whose tree succeeded, from the states of its items.
 
-    The status is FAILURE if items were lost, else INCOMPLETE if items were rejected, else SUCCESS.
+    The status is FAILURE if items were lost, else INCOMPLETE if items were rejected or if no item explains
+    what images or sensors show, else SUCCESS.
     """
     items = ledger.list_items()
     if lost := [item.item for item in items if item.state == "lost"]:
@@ -328,6 +330,8 @@ def _check_items(ledger: Tracker) -> _LoopEnd:
     if rejected := [f"{item.item} ({item.reason})" for item in items if item.state == "rejected"]:
         message = f"{len(rejected)} object(s) were not sorted: {', '.join(rejected)}"
         return _LoopEnd("INCOMPLETE", "rejected", message)
+    if texts := [event.text for event in ledger.unexplained.events]:
+        return _LoopEnd("INCOMPLETE", "unexplained", f"{len(texts)} unexplained: {'; '.join(texts)}")
     return _LoopEnd("SUCCESS")
 
 

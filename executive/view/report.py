@@ -114,7 +114,8 @@ class ReportData:
         all_items = self.timeline.items.changes.values()
         self.last_item_changes = [item for item in all_items if item.state != "phantom"]
         self.activities, self.times_by_item = compute_activity_times(self.timeline, self.nodes)
-        self.pictures = collect_pictures(directory.pictures, [item.item for item in all_items])
+        names = [*(item.item for item in all_items), *self.timeline.unexplained]
+        self.pictures = collect_pictures(directory.pictures, names)
         self.requests = list_requests(self.timeline)
         file = Path(self.start.file)
         mission = file.stem if file.parent == get_shipped_folder() else str(file)

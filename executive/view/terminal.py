@@ -103,6 +103,8 @@ class LineView:
                 return f"request: {event.request}"
             case events.BinsEmptied():
                 return f"emptied: {', '.join(event.bins)}"
+            case events.UnexplainedChanged() if event.is_open:
+                return f"{event.name}: {event.text}"
             case events.ItemChanged():
                 return self._describe_change(event)
         return ""
@@ -303,6 +305,7 @@ def format_summary(
         outcomes.insert(0, f"  taken out of the bins: {emptied_count}")
     if labels_text := describe_unknown_labels(result.unknown_labels):
         outcomes.append(f"  {labels_text}")
+    outcomes += [f"  {entry.name}: {entry.text}" for entry in result.unexplained]
     outcomes += [f"  detector error rates are assumed: {reason}" for reason in result.assumption_reasons]
     warning = wrap_lines(result.disagreement, "", "  ", max_lines=3)
     if result.diagnosis is not None:

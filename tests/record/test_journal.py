@@ -229,6 +229,7 @@ def test_every_kind_of_event_comes_back_as_it_was(path):
         kinds.BranchChosen("a", "again", "Grasp.missed", "no seal"),
         frame_searched(detected("cube"), unknown_labels=["x"]),
         item_changed("cube-1"), kinds.BinsEmptied(["red_bin"]),
+        kinds.UnexplainedChanged("unexplained-1", "a thing", [0.5, 0.1, 0.0], 3, [1.0, 2.0, 3.0, 4.0]),
         TargetSelected("cube-1", "cube", 1, "red_bin"), ToolCommanded("close"),
         kinds.MotionPlanned(True, 0.0, 1.5), InputRead("sensor", 1, value), kinds.OperatorAsked(["cube"]),
         kinds.RequestGiven(None),

@@ -1,0 +1,122 @@
+"""What images or sensors show, and no item explains: regions of the table, contents of bins, empty picks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from executive.cell.frame import Detections, Region
+from executive.cell.json_values import round_values
+from executive.events import Emit, UnexplainedChanged
+from executive.geometry import Array
+
+SETTLING_LOOK_COUNT = 3
+"""Number of looks at a region after which further looks tell nothing new."""
+
+
+@dataclass(eq=False)
+class Entry:
+    """Something that no item explains.
+
+    Attributes:
+        event: Last event about it.
+        position: Position `(3,)` [m] of a region of the table; None for anything else.
+        look_count: Number of looks that showed the region.
+        miss_count: Number of looks at its position that did not show it.
+    """
+
+    event: UnexplainedChanged
+    position: Array | None = None
+    look_count: int = 0
+    miss_count: int = 0
+
+
+class Unexplained:
+    """All that no item explains; a run with an open entry does not succeed.
+
+    `emit` receives an event for each new or changed entry.
+    """
+
+    def __init__(self, emit: Emit) -> None:
+        self._emit = emit
+        self._entries: dict[str, Entry] = {}
+        self._count = 0
+
+    @property
+    def events(self) -> list[UnexplainedChanged]:
+        """Last event of each open entry, in the order of their discovery."""
+        return [entry.event for entry in self._entries.values()]
+
+    @property
+    def needs_look(self) -> bool:
+        """True if a further look may explain a region of the table."""
+        regions = (entry for entry in self._entries.values() if entry.position is not None)
+        return any(entry.look_count + entry.miss_count < SETTLING_LOOK_COUNT for entry in regions)
+
+    def report(self, key: str, text: str, position: Array | None = None, frame: int = 0) -> None:
+        """Open an entry, or replace the text of the entry with this key.
+
+        Args:
+            key: Key of the entry, for instance `bin red_bin`.
+            text: Sentence for the result of the run.
+            position: Position `(3,)` [m], or None.
+            frame: Number of the frame that shows it; 0 for none.
+        """
+        point = [] if position is None else round_values(position, 4)
+        entry = self._entries.get(key)
+        if entry is None:
+            self._count += 1
+            name = f"unexplained-{self._count}"
+            self._entries[key] = Entry(UnexplainedChanged(name, text, point, frame))
+        elif entry.event.text == text:
+            return
+        else:
+            entry.event = UnexplainedChanged(entry.event.name, text, point, frame)
+        self._emit(self._entries[key].event)
+
+    def withdraw(self, key: str) -> None:
+        """Close the entry with a key, if there is one, because it has been explained."""
+        entry = self._entries.pop(key, None)
+        if entry is not None:
+            event = entry.event
+            self._emit(UnexplainedChanged(event.name, event.text, event.position, is_open=False))
+
+    def observe(self, look: Detections, regions: Sequence[Region], max_distance: float) -> None:
+        """Update the regions of the table with those that a look shows.
+
+        A region that as many looks have missed as shown is closed.
+
+        Args:
+            look: The look, which determines which positions are in view.
+            regions: Regions of its frame that neither the empty table nor an item explains.
+            max_distance: Maximum distance between two observations of one region [m].
+        """
+        new_regions = list(regions)
+        for key, entry in list(self._entries.items()):
+            if entry.position is None:
+                continue
+            position = entry.position
+            distances = [math.dist(position[:2], region.position[:2]) for region in new_regions]
+            if distances and min(distances) <= max_distance:
+                region = new_regions.pop(distances.index(min(distances)))
+                entry.look_count += 1
+                self._show(entry, region, look.frame.id)
+            elif look.compute_searched_mask(position[None])[0]:
+                entry.miss_count += 1
+                if entry.miss_count >= entry.look_count:
+                    self.withdraw(key)
+        for region in new_regions:
+            self._count += 1
+            name = f"unexplained-{self._count}"
+            entry = Entry(UnexplainedChanged(name, region.text, []), region.position, look_count=1)
+            self._entries[name] = entry
+            self._show(entry, region, look.frame.id)
+
+    def _show(self, entry: Entry, region: Region, frame: int) -> None:
+        """Emit an entry whose region a frame shows."""
+        position = round_values(region.position, 4)
+        box = round_values(region.box, 1)
+        entry.position = region.position
+        entry.event = UnexplainedChanged(entry.event.name, region.text, position, frame, box)
+        self._emit(entry.event)
