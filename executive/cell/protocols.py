@@ -13,8 +13,8 @@ from typing import NamedTuple, Protocol
 
 from executive.cell.arm import Arm
 from executive.cell.device_config import MotionConfig
-from executive.cell.frame import Answer, Box, Detection, Detections, Frame, Observation
-from executive.cell.objects import Bin, Item, KnownItem, ObjectClass, Quotas, Target
+from executive.cell.frame import Answer, Box, Detection, Detections, Frame, Observation, Region
+from executive.cell.objects import Bin, Item, KnownItem, ObjectClass, Obstacle, Quotas, Target
 from executive.cell.tools import ToolMeasurement, ToolModel
 from executive.geometry import Array
 
@@ -58,14 +58,22 @@ class Ledger(Protocol):
             observations: The same detections, localized in the world.
         """
 
+    def observe_regions(self, look: Detections, regions: Sequence[Region]) -> None:
+        """Record the regions of a frame that nothing known explains (`Camera.find_unexplained`).
+
+        The table does not count as empty before several frames have shown or refuted each region. The result
+        of the run lists the remaining regions.
+        """
+
     def find_targets(self) -> Sequence[Target]:
         """Return a target for each item that still has to be sorted and has a known position."""
 
     def find_objects_on_table(self) -> Sequence[Target]:
         """Return all items that lie on the table with a probability of at least 0.5, and objects of no item.
 
-        Objects of no item have the label "": objects whose label the cell file ignores, and what the arm ran
-        into, unless it is an item or a bin. They are forgotten after some frames without them.
+        Objects of no item have the label "": objects whose label the cell file ignores, what the arm ran
+        into, unless it is an item or a bin, and the regions of `observe_regions`. They are forgotten after
+        some frames without them.
         """
 
     def find_uncertain_items(self) -> Sequence[Item]:
@@ -283,6 +291,12 @@ class Camera(Protocol):
 
     def capture(self) -> Frame:
         """Capture and return a new frame."""
+
+    def find_unexplained(self, look: Detections, obstacles: Collection[Obstacle]) -> Sequence[Region]:
+        """Return the regions of a frame that neither the table nor anything known explains.
+
+        Known are the arm, the bins, the detections and `obstacles`, the known objects on the table.
+        """
 
     def describe_displacement(self, frame: Frame) -> str:
         """Return a sentence if a frame shows that the camera is not at its declared pose, else ""."""

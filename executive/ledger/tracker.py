@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from executive.cell.config import LedgerConfig, TableConfig
-from executive.cell.frame import Detections, Frame, FrameCaptured, Observation
+from executive.cell.frame import Detections, Frame, FrameCaptured, Observation, Region
 from executive.cell.objects import Bin, Item, KnownItem, ObjectClass, Quotas, Target
 from executive.cell.protocols import Presence, Routes
 from executive.cell.tools import ToolMeasurement
@@ -97,6 +97,8 @@ class Tracker:
         reason_start = reason.partition(":")[0]
         if reason and not any(known.startswith(reason_start) for known in self.assumption_reasons):
             self.assumption_reasons.append(reason)
+        if detections.view == "full":
+            self._judge_proof(detections)
         if frame.id != self._last_frame_id:
             self._last_frame_id = frame.id
             self._last_stamp = frame.stamp
@@ -110,6 +112,11 @@ class Tracker:
         self.emit(FrameCaptured(frame))
         self.emit(make_look_event(detections, observations))
         return self.find_targets()
+
+    def observe_regions(self, look: Detections, regions: Sequence[Region]) -> None:
+        change_count = look.frame.change_count
+        unmoved = [each for each in regions if self._coverage.is_unchanged(each.position, change_count)]
+        self.unexplained.observe(look, unmoved, self.config.gate * AMBIGUITY_FACTOR)
 
     def update_presence(
         self, item: Item, detections: Detections, observations: Sequence[Observation]
@@ -284,7 +291,8 @@ class Tracker:
             for record in self._records.filter_by_state(*ON_TABLE)
             if record.belief.is_probable and not self._certainty.is_position_empty(record)
         ]
-        for position, _ in reversed(self._bodies):
+        bodies = [position for position, _ in reversed(self._bodies)]
+        for position in (*bodies, *self.unexplained.positions):
             if self._is_separate(position, targets):
                 targets.append(Target("an object of no item", "", position, 0.0, 0, 0, 0.0))
         return targets
@@ -318,6 +326,8 @@ class Tracker:
         if routed_labels and not labels:
             return True
         if self._coverage.max_object_probability > self.config.max_miss_probability:
+            return False
+        if self.unexplained.needs_look:
             return False
         records = (record for record in self._records.all if record.item not in ignored_items)
         possible_items = [record for record in records if self._certainty.may_be_on_table(record)]
@@ -388,6 +398,15 @@ class Tracker:
         if detections.view == "full":
             self._bin_contents.confirm_placed_items(detections, observations)
             self._bin_contents.mark_dropped_items_as_placed(detections, bin_names)
+
+    def _judge_proof(self, detections: Detections) -> None:
+        """Report a look at the whole image that cannot prove an empty table, or withdraw an earlier report."""
+        if not detections.error_rates.is_blind:
+            self.unexplained.withdraw("empty table")
+            return
+        cause = detections.error_rates.assumption_reason or "an object of a class may have its colour"
+        text = f"images cannot prove that the table is empty: {cause}"
+        self.unexplained.report("empty table", text, frame=detections.frame.id)
 
     def _add_body(self, position: Array) -> None:
         """Record an object of no item at `position` `(3,)` [m], unless an item or a bin is there."""

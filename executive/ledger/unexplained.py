@@ -49,6 +49,11 @@ class Unexplained:
         return [entry.event for entry in self._entries.values()]
 
     @property
+    def positions(self) -> list[Array]:
+        """Position `(3,)` [m] of each region of the table."""
+        return [entry.position for entry in self._entries.values() if entry.position is not None]
+
+    @property
     def needs_look(self) -> bool:
         """True if a further look may explain a region of the table."""
         regions = (entry for entry in self._entries.values() if entry.position is not None)

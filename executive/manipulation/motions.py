@@ -14,7 +14,7 @@ from executive.cell.objects import Item, Target
 from executive.cell.protocols import Cell, Steps
 from executive.errors import Blocked, Crowded, NoDepth, Unavailable, Unreachable
 from executive.geometry import GRAVITY, Array
-from executive.manipulation.tool_goals import list_obstacles
+from executive.manipulation.tool_goals import list_obstacles, make_obstacle
 from executive.skill import Skill, SkillFailed
 
 T = TypeVar("T")
@@ -70,6 +70,11 @@ def localize_and_observe(
         raise SkillFailed("stale", message)
     targets = list(cell.ledger.observe(look, observations))
     yield
+    if look.view == "full":
+        items = [target for target in cell.ledger.find_objects_on_table() if target.label]
+        known_objects = [make_obstacle(cell, target) for target in items]
+        cell.ledger.observe_regions(look, cell.camera.find_unexplained(look, known_objects))
+        yield
     return observations, targets
 
 

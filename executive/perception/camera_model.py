@@ -207,7 +207,7 @@ def measure_top_height(detection: Detection, frame: Frame) -> float:
     height, width = frame.depth.shape
     columns = np.arange(max(0, math.floor(x - half_width)), min(width, math.ceil(x + half_width)))
     rows = np.arange(max(0, math.floor(y - half_height)), min(height, math.ceil(y + half_height)))
-    heights = _compute_heights(frame, frame.depth, columns, rows)
+    heights = compute_heights(frame, frame.depth, columns, rows)
     valid_count = int(np.isfinite(heights).sum())
     min_count = max(1, math.ceil(MIN_VALID_FRACTION * heights.size))
     if valid_count < min_count:
@@ -218,7 +218,7 @@ def measure_top_height(detection: Detection, frame: Frame) -> float:
     return float(np.quantile(_average_patches(heights, detection), TOP_QUANTILE))
 
 
-def _compute_heights(frame: Frame, depth: Array, columns: NDArray[np.intp], rows: NDArray[np.intp]) -> Array:
+def compute_heights(frame: Frame, depth: Array, columns: NDArray[np.intp], rows: NDArray[np.intp]) -> Array:
     """Return the heights `(rows, columns)` [m] above the table of the given pixels, NaN if unknown."""
     u, v = np.meshgrid(columns + 0.5, rows + 0.5)
     # Vectors in the camera frame from the camera to the points at depth 1 m.

@@ -22,7 +22,7 @@ from pydantic import JsonValue
 from pydantic_core import from_json, to_json
 
 from executive import errors
-from executive.cell.frame import Answer, Detection, ErrorRates, Observation
+from executive.cell.frame import Answer, Detection, ErrorRates, Observation, Region
 from executive.cell.protocols import BehaviourStep
 from executive.errors import ExecutiveError, Interrupted, Stopped, to_text
 from executive.events import Emit, InputRead, ToolCommanded
@@ -102,6 +102,17 @@ def decode_observation(value: Any) -> Observation:
     )  # fmt: skip
 
 
+def encode_region(region: Region) -> list[Any]:
+    """Return the attributes of a region as a list."""
+    return [list(map(float, region.box)), region.position.tolist(), region.text]
+
+
+def decode_region(value: Any) -> Region:
+    """Return the region that `encode_region` encoded."""
+    box, position, text = value
+    return Region(tuple(box), decode_array(position), text)
+
+
 def encode_behaviour_step(step: BehaviourStep) -> dict[str, Any]:
     """Return the attributes of a step of a behaviour.
 
@@ -152,6 +163,9 @@ ANSWER = Codec(encode_answer, decode_answer)
 OBSERVATIONS = Codec(
     lambda observations: list(map(encode_observation, observations)),
     lambda values: list(map(decode_observation, values)),
+)
+REGIONS = Codec(
+    lambda regions: list(map(encode_region, regions)), lambda values: list(map(decode_region, values))
 )
 BEHAVIOUR_STEP = Codec(encode_behaviour_step, decode_behaviour_step)
 MOTION = Codec(attrgetter("duration"), RecordedMotion)
@@ -205,6 +219,7 @@ METHODS: Mapping[str, Input] = {
     "image.capture": Input("camera.image", IMAGE),
     "camera.sees_table": Input("camera.sees_table"),
     "camera.describe_displacement": Input("camera.displacement"),
+    "camera.find_unexplained": Input("camera.regions", REGIONS),
     "detector.request": COMMAND,
     "request.result": Input("detector.{name}", ANSWER),
     "operator.ask": Input("operator"),

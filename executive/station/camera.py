@@ -15,14 +15,15 @@ from numpy.typing import NDArray
 
 from executive.cell.config import CellConfig
 from executive.cell.devices import ArmDevice, CameraDevice, CameraImage
-from executive.cell.frame import Box, Frame, TrueFrame
-from executive.cell.objects import Bin
+from executive.cell.frame import Box, Detections, Frame, Region, TrueFrame
+from executive.cell.objects import Bin, Obstacle
 from executive.cell.protocols import Tool
 from executive.errors import Fault
 from executive.geometry import Array, Pose
 from executive.motion.joints import Kinematics
 from executive.perception.camera_check import describe_displacement
 from executive.perception.camera_model import BORDER_FRACTION, compute_calibration, compute_hull_mask
+from executive.perception.witness import find_unexplained
 
 MAX_PIXELS = 10**8
 """Maximum number of pixels of a recorded image."""
@@ -96,6 +97,8 @@ class CellCamera:
         self._load_height = config.max_hold_height
         heights = (0.0, config.max_pile_height)
         self._workspace_corners = np.array(list(itertools.product(config.table.x, config.table.y, heights)))
+        self._table = config.table
+        self._min_radius = min(section.radius for section in config.objects.values())
         self._frame_count = 0
         self._pose_count = 0
         self._content_mask = np.ones((self.config.height, self.config.width), dtype=bool)
@@ -150,6 +153,12 @@ class CellCamera:
     def describe_displacement(self, frame: Frame) -> str:
         """Return a sentence if the bins in a frame are not where the declared pose shows them, else ""."""
         return describe_displacement(frame, self._bins) if self._is_hidden_by_arm else ""
+
+    def find_unexplained(self, look: Detections, obstacles: Collection[Obstacle]) -> list[Region]:
+        """Return the regions of a frame that no detection and no obstacle explains; none without physics."""
+        if not self._is_hidden_by_arm:
+            return []
+        return find_unexplained(look, self._table, self._bins, obstacles, self._min_radius)
 
     def _compute_pose(self, q: Array) -> Pose:
         """Return the pose `X_WC` of the camera at joint positions `q` `(n,)` [rad]."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal, TypeAlias
 
@@ -33,6 +34,9 @@ ABSOLUTE_TOLERANCE = 6.0
 """Minimum tolerance below and above the measured range of a statistic [grey level]."""
 RELATIVE_TOLERANCE = 0.08
 """Minimum tolerance below and above the measured range of a statistic, as a fraction of the range limit."""
+MIN_COLOUR_DIFFERENCE = 25.0
+"""Minimum difference between the colours of a class and of the table in one channel [grey level], at which the
+witness (`executive.perception.witness`) finds each object, with and without a shadow."""
 MEASUREMENT_SUFFIX = ".measured.json"
 """Suffix of a measurement file, after the name of the cell."""
 MAX_FILE_SIZE = 1_000_000
@@ -254,8 +258,26 @@ def rate_frame(frame: Frame, *, detector: str, envelope: Envelope, config: CellC
             f"the workspace differs from all images with which detector {detector} was measured: "
             f"{difference}; {describe_measurement_command(config)}"
         )
-        return assume_rates(error_rates.threshold, reason)
+        rates = assume_rates(error_rates.threshold, reason)
+        # A depth image shows objects in any light and colour.
+        return replace(rates, is_blind=frame.depth is None)
+    if statistics and frame.depth is None and find_hidden_labels(config, statistics):
+        return replace(error_rates, is_blind=True)
     return error_rates
+
+
+def find_hidden_labels(config: CellConfig, colours: Mapping[str, float]) -> list[str]:
+    """Return the classes with a colour like that of the table, which an image may not show.
+
+    `colours` contains `red`, `green` and `blue` of the table [grey level]. The declared colours of the classes
+    are those in white light.
+    """
+    table = [colours[name] for name in ("red", "green", "blue")]
+    return [
+        label
+        for label, section in config.objects.items()
+        if any(np.abs(255.0 * np.array(each) - table).max() < MIN_COLOUR_DIFFERENCE for each in section.colours)
+    ]
 
 
 def find_envelopes(config: CellConfig, base: Path, folders: Sequence[Path]) -> dict[str, Envelope]:
