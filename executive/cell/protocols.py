@@ -65,6 +65,18 @@ class Ledger(Protocol):
         of the run lists the remaining regions.
         """
 
+    def choose_place_to_probe(self) -> Array | None:
+        """Return the centre `(3,)` [m] of an unexplained region that two looks showed, or None.
+
+        Each region is chosen at most once, so that a probe that fails is not repeated.
+        """
+
+    def record_probe(self, place: Array, height: float | None) -> None:
+        """Record a descent of the tool to the centre of an unexplained region `(3,)` [m].
+
+        `height` is the height of the contact [m]; None if the tool touched nothing.
+        """
+
     def find_targets(self) -> Sequence[Target]:
         """Return a target for each item that still has to be sorted and has a known position."""
 

@@ -118,6 +118,15 @@ class Tracker:
         unmoved = [each for each in regions if self._coverage.is_unchanged(each.position, change_count)]
         self.unexplained.observe(look, unmoved, self.config.gate * AMBIGUITY_FACTOR)
 
+    def choose_place_to_probe(self) -> Array | None:
+        return self.unexplained.choose_place_to_probe()
+
+    def record_probe(self, place: Array, height: float | None) -> None:
+        self.unexplained.record_probe(place, height)
+        # The tool may have moved what it touched.
+        if height is not None:
+            self.invalidate_positions()
+
     def update_presence(
         self, item: Item, detections: Detections, observations: Sequence[Observation]
     ) -> Presence:

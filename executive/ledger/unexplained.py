@@ -24,12 +24,16 @@ class Entry:
         position: Position `(3,)` [m] of a region of the table; None for anything else.
         look_count: Number of looks that showed the region.
         miss_count: Number of looks at its position that did not show it.
+        is_probed: True if a skill has chosen the region for a probe.
+        touch_height: Height at which the tool touched it [m]; None without a touch.
     """
 
     event: UnexplainedChanged
     position: Array | None = None
     look_count: int = 0
     miss_count: int = 0
+    is_probed: bool = False
+    touch_height: float | None = None
 
 
 class Unexplained:
@@ -42,6 +46,8 @@ class Unexplained:
         self._emit = emit
         self._entries: dict[str, Entry] = {}
         self._count = 0
+        self._flat_places: list[Array] = []
+        """Positions `(3,)` [m] of regions at which the tool touched nothing."""
 
     @property
     def events(self) -> list[UnexplainedChanged]:
@@ -56,8 +62,28 @@ class Unexplained:
     @property
     def needs_look(self) -> bool:
         """True if a further look may explain a region of the table."""
-        regions = (entry for entry in self._entries.values() if entry.position is not None)
-        return any(entry.look_count + entry.miss_count < SETTLING_LOOK_COUNT for entry in regions)
+        return any(
+            entry.look_count + entry.miss_count < SETTLING_LOOK_COUNT
+            for entry in self._entries.values()
+            if entry.position is not None and entry.touch_height is None
+        )
+
+    def choose_place_to_probe(self) -> Array | None:
+        """Return the position `(3,)` [m] of a region that two looks showed, at most once for each, or None."""
+        for entry in self._entries.values():
+            if entry.look_count >= 2 and not entry.is_probed:
+                entry.is_probed = True
+                return entry.position
+        return None
+
+    def record_probe(self, place: Array, height: float | None) -> None:
+        """Record that the tool touched the region at `place` `(3,)` [m] at a height [m]; None: nothing."""
+        for key, entry in list(self._entries.items()):
+            if entry.position is place and height is None:
+                self._flat_places.append(place)
+                self.withdraw(key)
+            elif entry.position is place:
+                entry.touch_height = height
 
     def report(self, key: str, text: str, position: Array | None = None, frame: int = 0) -> None:
         """Open an entry, or replace the text of the entry with this key.
@@ -97,7 +123,11 @@ class Unexplained:
             regions: Regions of its frame that neither the empty table nor an item explains.
             max_distance: Maximum distance between two observations of one region [m].
         """
-        new_regions = list(regions)
+        new_regions = [
+            region
+            for region in regions
+            if all(math.dist(region.position[:2], place[:2]) > max_distance for place in self._flat_places)
+        ]
         for key, entry in list(self._entries.items()):
             if entry.position is None:
                 continue
@@ -122,6 +152,11 @@ class Unexplained:
         """Emit an entry whose region a frame shows."""
         position = round_values(region.position, 4)
         box = round_values(region.box, 1)
+        touch = (
+            ""
+            if entry.touch_height is None
+            else f"; the tool touched it at {entry.touch_height * 1000:.0f} mm"
+        )
         entry.position = region.position
-        entry.event = UnexplainedChanged(entry.event.name, region.text, position, frame, box)
+        entry.event = UnexplainedChanged(entry.event.name, region.text + touch, position, frame, box)
         self._emit(entry.event)

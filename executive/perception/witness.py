@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator
 
 import cv2
 import numpy as np
@@ -31,9 +31,9 @@ WINDOW = 0.25
 MAX_TABLE_DEVIATION = 45.0
 """Maximum deviation of a pixel of the table from the median colour of the workspace [grey level], for the
 first estimate of the table's colour."""
-MIN_CONTRAST = 10.0
+MIN_CONTRAST = 8.0
 """Minimum deviation of a region from the colour of the table [grey level]."""
-MIN_CONTRAST_STDS = 4.0
+MIN_CONTRAST_STDS = 3.2
 """Minimum deviation of a region from the colour of the table, in standard deviations of the table's pixels."""
 SAMPLE_STEP = 8
 """Distance between the pixels of which the median is computed."""

@@ -276,7 +276,9 @@ def find_hidden_labels(config: CellConfig, colours: Mapping[str, float]) -> list
     return [
         label
         for label, section in config.objects.items()
-        if any(np.abs(255.0 * np.array(each) - table).max() < MIN_COLOUR_DIFFERENCE for each in section.colours)
+        if any(
+            np.abs(255.0 * np.array(each) - table).max() < MIN_COLOUR_DIFFERENCE for each in section.colours
+        )
     ]
 
 
