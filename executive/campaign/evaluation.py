@@ -266,6 +266,7 @@ def store_evaluation(
             str(count): envelope.ErrorCounts(**row) for count, row in sorted(evaluation.by_count.items())
         },
         frames=evaluation.frames,
+        witness=evaluation.witness,
     )
     advice = "name another file with --out, and copy it into the folder of your cell file"
     with explain_os_errors(InputError, f"the measurement {path} cannot be written", advice):
@@ -295,6 +296,10 @@ def list_metrics(source: str, detector: str, evaluation: Evaluation) -> Iterator
         yield table
         yield _make_confusion_table(evaluation)
     yield _make_error_table(evaluation)
+    if (witness := evaluation.witness) is not None:
+        counts = ", ".join(f"{found} of {total} {label}" for label, (found, total) in witness.objects.items())
+        yield f"  objects that the image shows without a detection: {counts}"
+        yield f"  regions without an object: {witness.false_regions}"
     if evaluation.reliability is not None:
         yield "  upper 95 % confidence bounds of the error rates, for the ledger:"
         yield "  " + ", ".join(f"{name} {value:g}" for name, value in evaluation.reliability.rates)

@@ -130,7 +130,7 @@ class ErrorRates:
         repeated: Fraction of the errors that occur again in a second frame from the same camera pose.
         bias: Standard deviation of the systematic error of an object's position, along each axis [m].
         assumption_reason: Reason why the rates are assumed; "" if they are measured.
-        is_blind: True if the image cannot prove that the table is empty.
+        blindness: Reason why the image cannot prove that the table is empty, or "".
     """
 
     threshold: float
@@ -141,7 +141,7 @@ class ErrorRates:
     repeated: float = 0.0
     bias: float = 0.0
     assumption_reason: str = ""
-    is_blind: bool = False
+    blindness: str = ""
 
 
 def assume_rates(threshold: float, reason: str) -> ErrorRates:

@@ -409,13 +409,12 @@ class Tracker:
             self._bin_contents.mark_dropped_items_as_placed(detections, bin_names)
 
     def _judge_proof(self, detections: Detections) -> None:
-        """Report a look at the whole image that cannot prove an empty table, or withdraw an earlier report."""
-        if not detections.error_rates.is_blind:
+        """Report a look at the whole image that cannot prove an empty table, or withdraw the report."""
+        if blindness := detections.error_rates.blindness:
+            text = f"images cannot prove that the table is empty: {blindness}"
+            self.unexplained.report("empty table", text, frame=detections.frame.id)
+        else:
             self.unexplained.withdraw("empty table")
-            return
-        cause = detections.error_rates.assumption_reason or "an object of a class may have its colour"
-        text = f"images cannot prove that the table is empty: {cause}"
-        self.unexplained.report("empty table", text, frame=detections.frame.id)
 
     def _add_body(self, position: Array) -> None:
         """Record an object of no item at `position` `(3,)` [m], unless an item or a bin is there."""

@@ -69,7 +69,7 @@ class Unexplained:
         )
 
     def choose_place_to_probe(self) -> Array | None:
-        """Return the position `(3,)` [m] of a region that two looks showed, at most once for each, or None."""
+        """Return the position `(3,)` [m] of a region that two looks showed, once for each, or None."""
         for entry in self._entries.values():
             if entry.look_count >= 2 and not entry.is_probed:
                 entry.is_probed = True
@@ -152,11 +152,9 @@ class Unexplained:
         """Emit an entry whose region a frame shows."""
         position = round_values(region.position, 4)
         box = round_values(region.box, 1)
-        touch = (
-            ""
-            if entry.touch_height is None
-            else f"; the tool touched it at {entry.touch_height * 1000:.0f} mm"
-        )
+        text = region.text
+        if entry.touch_height is not None:
+            text += f"; the tool touched it at {entry.touch_height * 1000:.0f} mm"
         entry.position = region.position
-        entry.event = UnexplainedChanged(entry.event.name, region.text + touch, position, frame, box)
+        entry.event = UnexplainedChanged(entry.event.name, text, position, frame, box)
         self._emit(entry.event)

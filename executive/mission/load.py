@@ -306,9 +306,12 @@ def load_mission(
     if checker is not None:
         folders = (cell.path.parent, get_shipped_folder() / "cells")
         for name, (error_rates, _) in find_envelopes(config, cell.path.parent, folders).items():
+            span = cell.find_span(("detectors", name), at_key=True)
             if message := error_rates.assumption_reason:
-                span = cell.find_span(("detectors", name), at_key=True)
                 findings.append(make_warning(span, "not-measured", message))
+            elif blindness := error_rates.blindness:
+                message = f"images of detector {name} cannot prove that the table is empty: {blindness}"
+                findings.append(make_warning(span, "blind", f"{message}; use a camera with depth"))
     libraries = [
         find_file_below(library_folder or mission_path.parent, library) for library in files.libraries
     ]

@@ -34,7 +34,12 @@ first estimate of the table's colour."""
 MIN_CONTRAST = 8.0
 """Minimum deviation of a region from the colour of the table [grey level]."""
 MIN_CONTRAST_STDS = 3.2
-"""Minimum deviation of a region from the colour of the table, in standard deviations of the table's pixels."""
+"""Minimum deviation of a region from the colour of the table, in standard deviations of the table's pixels.
+
+With both limits, 330 frames of the cells overhead, wrist, fasteners, depth and overhead_large, empty and with
+up to 20 objects, had no region without an object; also none with limits of 7 and 2.8. Each of 250 objects of
+these cells was found when its detection was withheld, unless another object hid it.
+"""
 SAMPLE_STEP = 8
 """Distance between the pixels of which the median is computed."""
 MIN_SAMPLES = 100
@@ -96,7 +101,7 @@ def find_unexplained(
     raised_mask = _find_deviations(image, unexplained_mask, round(WINDOW * scale))
     if frame.depth is not None:
         raised_mask |= _find_raised(frame, frame.depth)
-    # A region at the border of the searched part may continue there; it may be the floor, or a part of the arm.
+    # A region at the border of the searched part may continue there, as floor and arm do.
     border_mask = cv2.dilate((~(searched_mask & visible_mask)).astype(np.uint8), np.ones((3, 3))) > 0
     min_area = MIN_AREA_FRACTION * math.pi * (min_radius * scale) ** 2
     found = _list_components(raised_mask & unexplained_mask, border_mask, min_area, MAX_SIDE * scale)

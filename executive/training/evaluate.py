@@ -6,6 +6,7 @@ import contextlib
 import heapq
 import math
 import time
+from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,11 +18,13 @@ from numpy.typing import NDArray
 
 from executive.cell.config import CellConfig, DetectorConfig
 from executive.cell.device_config import CameraConfig
-from executive.cell.frame import Box, Detection, Frame
+from executive.cell.frame import Box, Detection, Detections, Frame, Region, assume_rates
 from executive.cell.protocols import Localizer
 from executive.errors import Unavailable
 from executive.perception.detectors.detector_registry import build_kinds, close_kind
-from executive.perception.detectors.envelope import FrameRange, compute_frame_statistics
+from executive.perception.detectors.envelope import FrameRange, WitnessCounts, compute_frame_statistics
+from executive.perception.detectors.views import compute_overlaps
+from executive.perception.witness import find_unexplained
 from executive.training.dataset import LabelledImage
 from executive.training.metrics import (
     BoxMatch,
@@ -90,6 +93,7 @@ def evaluate(
     errors = ErrorStatistics(localizer)
     average_precision = AveragePrecision()
     statistics_of_frames: list[Mapping[str, float]] = []
+    witness_counts = WitnessStatistics()
     latencies: list[float] = []
     unavailable_reasons: list[str] = []
     min_confidence = detector.threshold if threshold is None else threshold
@@ -111,6 +115,8 @@ def evaluate(
         errors.add(matches, second_matches, sample, frame)
         if cell is not None and (frame_statistics := compute_frame_statistics(frame, cell)):
             statistics_of_frames.append(frame_statistics)
+        if cell is not None:
+            witness_counts.add(sample, frame, cell)
         if mistakes is not None:
             collect_mistakes(mistakes, matches, sample)
     map50, map50_95 = average_precision.compute()
@@ -134,6 +140,7 @@ def evaluate(
         by_count={count: dict(counts) for count, counts in errors.counts_by_object_count.items()},
         reliability=errors.estimate_error_rates(),
         frames=FrameRange.compute(statistics_of_frames),
+        witness=witness_counts.to_counts() if cell is not None else None,
     )
 
 
@@ -143,6 +150,41 @@ def _match_confident(
     """Return the matches of detections with at least `min_confidence`; ignored objects are excluded."""
     confident = [entry for entry in detections if entry.confidence >= min_confidence]
     return match_detections([entry for entry in confident if not is_ignored(entry, sample)], sample)
+
+
+class WitnessStatistics:
+    """Number of objects that the witness of an empty table finds when no detection shows them."""
+
+    def __init__(self) -> None:
+        self._found: Counter[str] = Counter()
+        self._total: Counter[str] = Counter()
+        self._false_count = 0
+
+    def add(self, sample: LabelledImage, frame: Frame, cell: CellConfig) -> None:
+        """Add an image: search it with all objects known, then without each completely visible object."""
+        boxes = [*sample.boxes, *sample.ignored_boxes]
+        self._false_count += len(_find_unexplained(frame, boxes, cell))
+        for index, label in enumerate(sample.labels):
+            if sample.is_fully_visible(index):
+                regions = _find_unexplained(frame, boxes[:index] + boxes[index + 1 :], cell)
+                overlaps = compute_overlaps([boxes[index], *(region.box for region in regions)])[0][0, 1:]
+                self._total[label] += 1
+                self._found[label] += bool((overlaps > 0).any())
+
+    def to_counts(self) -> WitnessCounts:
+        """Return the counts for a measurement file."""
+        objects = {label: (self._found[label], total) for label, total in sorted(self._total.items())}
+        return WitnessCounts(objects=objects, false_regions=self._false_count)
+
+
+def _find_unexplained(frame: Frame, boxes: Sequence[Box], cell: CellConfig) -> list[Region]:
+    """Return the regions of a frame that the table, the bins and the given boxes do not explain."""
+    height, width = frame.visible.shape
+    detections = tuple(Detection("", 1.0, box) for box in boxes)
+    area = (0.0, 0.0, float(width), float(height))
+    look = Detections("", detections, assume_rates(0.5, ""), frame=frame, view="full", area=area)
+    min_radius = min(section.radius for section in cell.objects.values())
+    return find_unexplained(look, cell.table, cell.build_bins().values(), (), min_radius)
 
 
 class AveragePrecision:

@@ -22,7 +22,7 @@ from executive.cell.protocols import Localizer
 from executive.errors import NoDepth
 from executive.geometry import Array
 from executive.perception.camera_model import intersect_plane
-from executive.perception.detectors.envelope import FrameRange, StoredErrorRates
+from executive.perception.detectors.envelope import FrameRange, StoredErrorRates, WitnessCounts
 from executive.training.dataset import LabelledImage
 
 NO_OBJECT = "nothing"
@@ -158,6 +158,7 @@ class Evaluation(ClassMetrics):
         by_count: Error counts by number of objects in the image. The keys of each row are `objects` (fully
             visible), `missed`, `confused` and `false_detections`.
         reliability: Error rates for the ledger; None if there was no answer.
+        witness: Objects that the witness of an empty table finds; None without a cell.
         frames: Brightness, contrast and colours of the workspace; None if no image shows all of it.
     """
 
@@ -176,12 +177,14 @@ class Evaluation(ClassMetrics):
     answered_by: Mapping[str, int] = field(default_factory=dict)
     by_count: Mapping[int, Mapping[str, int]] = field(default_factory=dict)
     reliability: MeasuredErrorRates | None = None
+    witness: WitnessCounts | None = None
     frames: FrameRange | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return all metrics as JSON values."""
         values = asdict(self)
         values["frames"] = self.frames and self.frames.model_dump()
+        values["witness"] = self.witness and self.witness.model_dump()
         if self.reliability is not None:
             values["reliability"]["rates"] = self.reliability.rates.model_dump()
         return values

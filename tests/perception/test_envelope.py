@@ -15,6 +15,7 @@ from executive.perception.detectors.envelope import (
     FrameRange,
     Measurement,
     StoredErrorRates,
+    WitnessCounts,
     compute_fingerprint,
     compute_frame_statistics,
     find_envelopes,
@@ -101,6 +102,16 @@ def test_a_measurement_of_another_camera_pose_does_not_hold_and_the_change_is_na
     assert "measured before a change of camera pose, so high error rates are assumed; measure it with" in text
 
 
+@pytest.mark.parametrize(("found", "is_blind"), [(98, False), (97, True)])
+def test_an_image_that_hides_a_class_does_not_prove_an_empty_table(stored, overhead, found, is_blind):
+    file = stored / "overhead.measured.json"
+    (measurement,) = read_measurements(file)
+    witness = WitnessCounts(objects={"cube": (100, 100), "duck": (found, 100)}, false_regions=0)
+    file.write_text(format_measurements((), measurement.model_copy(update={"witness": witness})))
+    blindness = find_envelopes(overhead, stored, [stored])["embedded"][0].blindness
+    assert blindness.endswith("only 97 of 100 duck") == bool(blindness) == is_blind
+
+
 def test_a_damaged_file_is_named_and_the_rates_are_assumed(overhead, tmp_path):
     (tmp_path / "overhead.measured.json").write_text("{")
     error_rates, _ = find_envelopes(overhead, tmp_path, [tmp_path])["embedded"]
@@ -122,7 +133,8 @@ def test_rates_are_assumed_for_frames_outside_the_measured_ranges(overhead, colo
     envelope = RATES.build_error_rates(0.5), WOOD_RANGE
     answered = rate_frame(make_frame(colour), detector="embedded", envelope=envelope, config=overhead)
     doubt = answered.assumption_reason
-    assert answered == (assume_rates(0.5, doubt) if doubted else RATES.build_error_rates(0.5))
+    assumed = replace(assume_rates(0.5, doubt), blindness=doubt)
+    assert answered == (assumed if doubted else RATES.build_error_rates(0.5))
     start = "the workspace differs from all images with which detector embedded was measured: "
     assert doubt.startswith(f"{start}brightness 60, measured 180 to 195; red 60") == doubted
     assert doubt.endswith("; measure it with `executive evaluate --cell overhead` (about 2 min)") == doubted

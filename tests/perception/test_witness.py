@@ -27,7 +27,7 @@ def draw(*patches: tuple[Array, float, Array], depth: Array | None = None) -> Fr
     rows, columns = np.indices((480, 640))
     image = TABLE_COLOUR + (0.04 * rows - 0.02 * columns)[..., None]
     for centre, side, colour in patches:
-        corners = project(MATRIX, X_WC, [centre + (sign * side / 2, sign * side / 2, 0) for sign in (-1, 1)])
+        corners = project(MATRIX, X_WC, [centre - side / 2, centre + side / 2])
         left, top = corners.min(axis=0).astype(int)
         right, bottom = corners.max(axis=0).astype(int)
         image[top:bottom, left:right] = colour

@@ -34,9 +34,9 @@ ABSOLUTE_TOLERANCE = 6.0
 """Minimum tolerance below and above the measured range of a statistic [grey level]."""
 RELATIVE_TOLERANCE = 0.08
 """Minimum tolerance below and above the measured range of a statistic, as a fraction of the range limit."""
-MIN_COLOUR_DIFFERENCE = 25.0
-"""Minimum difference between the colours of a class and of the table in one channel [grey level], at which the
-witness (`executive.perception.witness`) finds each object, with and without a shadow."""
+MIN_WITNESS_RATE = 0.98
+"""Minimum fraction of the objects of a class that the witness of an empty table must find; below, images do
+not prove that the table is empty."""
 MEASUREMENT_SUFFIX = ".measured.json"
 """Suffix of a measurement file, after the name of the cell."""
 MAX_FILE_SIZE = 1_000_000
@@ -129,6 +129,24 @@ class ErrorCounts(Section):
     false_detections: int
 
 
+class WitnessCounts(Section):
+    """How often the witness (`executive.perception.witness`) finds objects that no detection shows."""
+
+    objects: dict[str, tuple[int, int]]
+    """Number of found objects and of all objects, by class."""
+    false_regions: int
+    """Number of regions at which there was no object, in all images."""
+
+    def describe_weakness(self) -> str:
+        """Return a text with the classes of which the witness finds too few objects; "" if there are none."""
+        counts = ", ".join(
+            f"{found} of {total} {label}"
+            for label, (found, total) in self.objects.items()
+            if found < MIN_WITNESS_RATE * total
+        )
+        return counts and f"of objects without a detection, the image shows only {counts}"
+
+
 class Measurement(Section):
     """Errors of one detector in one cell, and the conditions under which they were measured."""
 
@@ -151,6 +169,8 @@ class Measurement(Section):
     """Errors by number of objects in the scene."""
     frames: FrameRange | None
     """Ranges of the statistics of the measured frames; None if no frame showed the whole workspace."""
+    witness: WitnessCounts | None = None
+    """Counts of the witness; None if they were not measured."""
 
 
 class MeasurementFile(Section):
@@ -260,26 +280,8 @@ def rate_frame(frame: Frame, *, detector: str, envelope: Envelope, config: CellC
         )
         rates = assume_rates(error_rates.threshold, reason)
         # A depth image shows objects in any light and colour.
-        return replace(rates, is_blind=frame.depth is None)
-    if statistics and frame.depth is None and find_hidden_labels(config, statistics):
-        return replace(error_rates, is_blind=True)
+        return replace(rates, blindness=reason if frame.depth is None else "")
     return error_rates
-
-
-def find_hidden_labels(config: CellConfig, colours: Mapping[str, float]) -> list[str]:
-    """Return the classes with a colour like that of the table, which an image may not show.
-
-    `colours` contains `red`, `green` and `blue` of the table [grey level]. The declared colours of the classes
-    are those in white light.
-    """
-    table = [colours[name] for name in ("red", "green", "blue")]
-    return [
-        label
-        for label, section in config.objects.items()
-        if any(
-            np.abs(255.0 * np.array(each) - table).max() < MIN_COLOUR_DIFFERENCE for each in section.colours
-        )
-    ]
 
 
 def find_envelopes(config: CellConfig, base: Path, folders: Sequence[Path]) -> dict[str, Envelope]:
@@ -297,7 +299,9 @@ def find_envelopes(config: CellConfig, base: Path, folders: Sequence[Path]) -> d
         fingerprint = compute_fingerprint(config, name, base)
         match = next((entry for _, entry in measurements if entry.fingerprint == fingerprint), None)
         if match is not None:
-            envelopes[name] = (match.rates.build_error_rates(threshold), match.frames)
+            rates = match.rates.build_error_rates(threshold)
+            blindness = match.witness.describe_weakness() if match.witness else ""
+            envelopes[name] = (replace(rates, blindness=blindness), match.frames)
             continue
         own_entries = (entry for cell, entry in measurements if (cell, entry.detector) == (config.cell, name))
         cause = "was never measured in this cell"
