@@ -73,7 +73,8 @@ class SimDriver:
         self.tools = {DEFAULT_ROLE: self.tool}
         self.cameras = dict.fromkeys(config.cameras, self.camera)
         self.last_command_tick = 0
-        self._bins = config.build_bins()
+        # The audit relies on the true bins of the scene, not on the cell file.
+        self._bins = self.world.config.build_bins()
 
     @staticmethod
     def check(config: CellConfig, cell_folder: Path) -> Iterable[tuple[KeyPath, str]]:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import AfterValidator, Field
 
-from executive.cell.config import CellConfig, ObjectConfig
+from executive.cell.config import BinConfig, CellConfig, ObjectConfig
 from executive.cell.device_config import (
     POSE_AND_FOV_KEYS,
     CalibrationConfig,
@@ -128,6 +128,19 @@ class UnknownConfig(Section):
     """Colours (r, g, b, each 0 to 1) of which each object gets one."""
 
 
+class SceneBinConfig(Section):
+    """True place and colour of one bin; frames, ledger and planner still rely on the cell file."""
+
+    missing: bool = False
+    """True if there is no such bin."""
+    at: str | None = None
+    """Name of the bin of the cell file at whose declared place this bin stands; by default its own."""
+    shift: tuple[Displacement, Displacement] = (0.0, 0.0)
+    """Displacement x, y [m] from that place, each -1 to 1."""
+    colour: Colour | None = None
+    """Colour of the walls: r, g, b, each 0 to 1; by default that of the cell file."""
+
+
 class SceneCameraConfig(Section):
     """Calibration errors of the camera; its frames contain the matrix and the pose of the cell file."""
 
@@ -158,6 +171,8 @@ class SceneConfig(Section):
     """Colours and sizes by class; `any`: every class without a section."""
     unknown: UnknownConfig | None = None
     """Objects without a class; none by default."""
+    bins: dict[str, SceneBinConfig] = Field(default_factory=dict)
+    """True places and colours of bins by name."""
     camera: SceneCameraConfig = SceneCameraConfig()
     """Calibration errors and noise of the camera."""
 
@@ -195,6 +210,12 @@ def _find_cell_findings(scene: SceneConfig, root: YamlNode, config: CellConfig) 
             span = find_span(root, ("objects", label), at_key=True)
             hint = suggest_choice(label, (*config.objects, ANY_CLASS), "Valid keys")
             yield make_error(span, "unknown-class", f'the cell {config.cell} has no class "{label}"', hint)
+    for name, section in scene.bins.items():
+        for unknown, keys in ((name, ()), (section.at or name, ("at",))):
+            if unknown not in config.bins:
+                span = find_span(root, ("bins", name, *keys), at_key=not keys)
+                hint = suggest_choice(unknown, config.bins, "Valid bins")
+                yield make_error(span, "unknown-bin", f'the cell {config.cell} has no bin "{unknown}"', hint)
     name, camera = next(iter(config.cameras.items()))
     if any(scene.camera.orbit_deg) and camera.mount != "fixed":
         yield make_error(
@@ -220,12 +241,24 @@ def build_world(config: CellConfig, scene: SceneConfig, *, gui: bool = False) ->
 
 
 def apply_scene(config: CellConfig, scene: SceneConfig) -> CellConfig:
-    """Return the cell configuration with the objects, the table and the camera of a scene."""
+    """Return the cell configuration with the objects, the table, the bins and the camera of a scene."""
     table_changes = scene.table.model_dump(include={"objects", "gap", "stacked"}, exclude_none=True)
     table = config.table.model_copy(update=table_changes)
     objects = {label: _change_object(label, model, scene) for label, model in config.objects.items()}
     cameras = {name: _change_camera(camera, scene) for name, camera in config.cameras.items()}
-    return config.model_copy(update={"table": table, "objects": objects, "cameras": cameras})
+    bins = {
+        name: _change_bin(bin, scene.bins[name], config) if name in scene.bins else bin
+        for name, bin in config.bins.items()
+        if name not in scene.bins or not scene.bins[name].missing
+    }
+    changes = {"table": table, "objects": objects, "bins": bins, "cameras": cameras}
+    return config.model_copy(update=changes)
+
+
+def _change_bin(bin: BinConfig, section: SceneBinConfig, config: CellConfig) -> BinConfig:
+    x, y, z = config.bins[section.at].position if section.at else bin.position
+    position = (x + section.shift[0], y + section.shift[1], z)
+    return bin.model_copy(update={"position": position, "colour": section.colour or bin.colour})
 
 
 def _change_object(label: str, model: ObjectConfig, scene: SceneConfig) -> ObjectConfig:
