@@ -16,13 +16,14 @@ class Transit(Skill):
     tool holds the item with a safety factor of two. The skill reads its sensor during the whole motion.
 
     The skill fails with `blocked` if the bin depends on the weight of the item, and no weighing made the
-    class of the item certain.
+    class of the item certain, and with `bin_missing` if images contradict the declared place or colour of
+    the bin.
     """
 
     held: In[Item] = port(refers_to="item", doc="the item in the tool")
     bin: In[str] = port(refers_to="bin", doc="the bin for the item")
     drop: Metres = param(DROP_HEIGHT, ge=0.005, le=0.1, doc="height of the item's underside above the slot")
-    reasons = ("unreachable", "blocked", "dropped")
+    reasons = ("unreachable", "blocked", "bin_missing", "dropped")
     uses = ("arm", "tool")
     moves = True
     tool_state = (HOLDING, HOLDING)
@@ -30,6 +31,8 @@ class Transit(Skill):
 
     def run(self, cell: Cell) -> Steps:
         """Plan the motion, and follow it while the tool holds the item."""
+        if contradiction := cell.ledger.contradicted_bins.get(self.bin):
+            raise self.failure("bin_missing", contradiction)
         if doubt := explain_uncertain_bin(cell, self.bin, self.held):
             raise self.failure("blocked", doubt)
         goal = make_bin_goal(cell, self.bin, self.held, self.drop)

@@ -110,7 +110,7 @@ class BinConfig(Section):
         size = np.array(self.size)
         slot_indices = np.array([*np.ndindex(self.slots)])
         slots = position[:2] + size[:2] * ((slot_indices + 0.5) / self.slots - 0.5)
-        return Bin(name, position, size, slots)
+        return Bin(name, position, size, slots, self.colour)
 
 
 class TableConfig(Section):

@@ -173,12 +173,14 @@ class Bin:
         position: Centre of the underside of the floor in the world `(3,)` [m].
         size: Inner length, width and wall height `(3,)` [m].
         slots: Drop positions over the floor `(N, 2)` [m], in the order of their use.
+        colour: Red, green and blue of the walls, each 0 to 1.
     """
 
     name: str
     position: Array
     size: Array
     slots: Array
+    colour: tuple[float, float, float] = (0.6, 0.6, 0.6)
 
     def contains(self, position: Array, margin: float = 0.0) -> bool:
         """Return True if x and y of `position` `(3,)` [m] are in the floor area, enlarged by `margin` [m]."""

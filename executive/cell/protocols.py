@@ -142,8 +142,19 @@ class Ledger(Protocol):
     def explain_skipped_class(self, label: str) -> str:
         """Return the reason why the mission does not sort further objects of a class, or "".
 
-        There are two reasons: the class has no route, or the quotas of all its bins are reached.
+        There are three reasons: the class has no route, the quotas of its bins are reached, or images
+        contradict its bins.
         """
+
+    @property
+    def contradicted_bins(self) -> Mapping[str, str]:
+        """Contradictions between images and the declared bins, by name of the bin."""
+
+    def has_unconfirmed_bin(self) -> bool:
+        """Return True if no image has shown one of the bins as declared, or as contradicted, so far."""
+
+    def record_bins(self, contradictions: Mapping[str, str], frame: Frame) -> None:
+        """Record the result of `Camera.check_bins`; it replaces earlier results for the same bins."""
 
     def find_next_slot_index(self, bin: str) -> int:
         """Return the index of the next free slot of a bin, behind the slots of all objects in the bin.
@@ -312,6 +323,12 @@ class Camera(Protocol):
 
     def describe_displacement(self, frame: Frame) -> str:
         """Return a sentence if a frame shows that the camera is not at its declared pose, else ""."""
+
+    def check_bins(self, frame: Frame) -> Mapping[str, str]:
+        """Return what a frame shows of bins by name: "" for a bin that is as declared, else a contradiction.
+
+        A bin that the frame does not show well enough is missing in the result.
+        """
 
 
 class Request(Protocol):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -18,6 +18,8 @@ from executive.ledger.belief import make_viewpoint_key
 from executive.ledger.item import ItemRecord, ItemRecords, State
 from executive.ledger.look import MAX_STANDARD_DEVIATIONS
 
+REASON_CONTRADICTED = "images contradict the declared place or colour of"
+"""Start of the reason of the state REJECTED of an item without a bin that may be used."""
 REASON_PROBABLY_FELL = "it probably fell into the bin"
 """Reason of the state PLACED of a dropped item that no look has shown in the bin."""
 WALL_MARGIN = 0.035
@@ -43,6 +45,7 @@ class BinContents:
         routes: Names of the permitted bins by class.
         records: All items.
         quotas: Maximum numbers of objects in the bins.
+        contradictions: What the last image of a bin shows, by name of the bin: "" if the bin is as declared.
     """
 
     config: LedgerConfig
@@ -50,6 +53,7 @@ class BinContents:
     routes: Routes
     records: ItemRecords
     quotas: Quotas
+    contradictions: dict[str, str] = field(default_factory=dict)
 
     def count_objects_in(self, bin_name: str, label: str | None = None) -> int:
         """Return the number of items that were released in a bin or have probably fallen into the bin.
@@ -76,11 +80,14 @@ class BinContents:
 
     def explain_skipped_class(self, label: str) -> str:
         """Return the reason why the mission does not sort objects of a class, or ""."""
-        bin_names = self.routes.get(label, ())
+        all_names = self.routes.get(label, ())
+        bin_names = [name for name in all_names if not self.contradictions.get(name)]
         if not all(is_quota_reached(self.quotas, name, label, self.count_objects_in) for name in bin_names):
             return ""
-        if not bin_names:
+        if not all_names:
             return "the mission has no route for it"
+        if contradicted_names := [name for name in all_names if name not in bin_names]:
+            return f"{REASON_CONTRADICTED} {', '.join(contradicted_names)}"
         subject, verb = ("quota", "is") if len(bin_names) == 1 else ("quotas", "are")
         return f"the {subject} of {', '.join(bin_names)} {verb} reached"
 

@@ -17,7 +17,12 @@ from executive.cell.tools import ToolMeasurement
 from executive.errors import Fault
 from executive.events import BinsEmptied, Emit, ItemChanged
 from executive.geometry import Array
-from executive.ledger.bin_contents import REASON_PROBABLY_FELL, BinContents, find_probable_bin
+from executive.ledger.bin_contents import (
+    REASON_CONTRADICTED,
+    REASON_PROBABLY_FELL,
+    BinContents,
+    find_probable_bin,
+)
 from executive.ledger.certainty import FINAL_STATES, Certainty, discard_moved_items
 from executive.ledger.coverage import Coverage
 from executive.ledger.item import ON_TABLE, ItemRecord, ItemRecords, State
@@ -249,16 +254,27 @@ class Tracker:
         self._bin_contents.archive_items(bins)
         self.emit(BinsEmptied(list(bins)))
 
+    def record_bins(self, contradictions: Mapping[str, str], frame: Frame) -> None:
+        self._bin_contents.contradictions.update(contradictions)
+        for name, contradiction in contradictions.items():
+            if contradiction:
+                self.unexplained.report(f"bin {name}", contradiction, frame=frame.id)
+            else:
+                self.unexplained.withdraw(f"bin {name}")
+
     def set_final_states(self, *, completed: bool) -> None:
         has_confirmed_item = any(self._confirmed_labels)
         dropped = self._records.filter_by_state(State.DROPPED)
         dropped_items = [record for record in dropped if not record.was_taken_away]
         for record in self._records.all:
             self._settle_undeclared(record)
+            skip_reason = self._explain_skipped_item(record)
             final_state = self._certainty.find_final_state(
-                record, skip_reason=self._explain_skipped_item(record),
+                record, skip_reason=skip_reason,
                 is_completed=completed, has_confirmed_item=has_confirmed_item,
             )  # fmt: skip
+            if final_state == (State.SKIPPED, skip_reason) and skip_reason.startswith(REASON_CONTRADICTED):
+                final_state = (State.REJECTED, skip_reason)
             if bin := find_probable_bin(record):
                 record.bin = bin
                 final_state = (State.PLACED, REASON_PROBABLY_FELL)
@@ -390,6 +406,13 @@ class Tracker:
 
     def find_next_slot_index(self, bin: str) -> int:
         return self._bin_contents.find_next_slot_index(bin)
+
+    @property
+    def contradicted_bins(self) -> Mapping[str, str]:
+        return {name: text for name, text in self._bin_contents.contradictions.items() if text}
+
+    def has_unconfirmed_bin(self) -> bool:
+        return len(self._bin_contents.contradictions) < len(self.bins)
 
     def explain_skipped_class(self, label: str) -> str:
         return self._bin_contents.explain_skipped_class(label)

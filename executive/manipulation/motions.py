@@ -39,6 +39,11 @@ def capture_and_detect(cell: Cell, detector: str, view: str) -> Generator[None, 
     # The detector searches the frame during this check.
     if displacement := cell.camera.describe_displacement(frame):
         raise SkillFailed("camera_moved", displacement)
+    # Both checks together exceed a control period.
+    if not request.ready:
+        yield
+    if view == "full" or cell.ledger.has_unconfirmed_bin():
+        cell.ledger.record_bins(cell.camera.check_bins(frame), frame)
     while not request.ready:
         yield
     try:

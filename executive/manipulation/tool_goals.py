@@ -152,13 +152,15 @@ def sort_pickable_targets(cell: Cell, targets: Sequence[Target]) -> list[Target]
 def choose_bin(cell: Cell, item: Item) -> str:
     """Return the first free bin with a quota, else the free bin with the fewest objects, else "".
 
-    A bin is free if it is permitted for the class of the item, and its quota is not reached. An item that the
+    A bin is free if it is permitted for the class of the item, its quota is not reached, and images do not
+    contradict it. An item that the
     arm is moving into a bin counts as an object in the bin. If the class of the item is not certain by its
     weight, and has no free bin, the function chooses a bin of a class that looks alike.
     """
     count_objects = partial(predict_object_count, cell)
     for label in cell.ledger.list_possible_labels(item):
-        bins = cell.routes.get(label, ())
+        contradicted_bins = cell.ledger.contradicted_bins
+        bins = [bin for bin in cell.routes.get(label, ()) if bin not in contradicted_bins]
         free_bins = [bin for bin in bins if not is_quota_reached(cell.quotas, bin, label, count_objects)]
         limited_bins = [bin for bin in free_bins if {(bin, None), (bin, label)} & cell.quotas.keys()]
         if free_bins:

@@ -12,6 +12,7 @@ import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import cv2
@@ -21,7 +22,7 @@ from numpy.typing import NDArray
 from executive.cell.frame import Frame
 from executive.cell.objects import BIN_THICKNESS, Bin
 from executive.geometry import Array, Pose
-from executive.perception.camera_model import NEAR_PLANE, project
+from executive.perception.camera_model import NEAR_PLANE, compute_hull_mask, project
 
 MAX_OUTLINE_DISTANCE = 0.005
 """Maximum mean distance between the outlines of the bins and their expected positions [m].
@@ -45,6 +46,8 @@ MIN_SAMPLES = 60
 MIN_NORMAL_EIGENVALUE = 0.12
 """Minimum of the smaller eigenvalue (0 to 0.5) of the mean outer product of the normals; 0 if all normals are
 parallel, so that the image does not determine the pose."""
+MIN_BIN_SAMPLES = 10
+"""Minimum number of visible samples for the support of one bin in one direction."""
 SAMPLE_SPACING = 6.0
 """Distance between neighbouring samples of an outline [pixel]."""
 BORDER_WIDTH = 4.0
@@ -75,6 +78,8 @@ AXIAL_SHIFTS = np.linspace(-0.21, 0.21, 7)
 """Translations of the search grid along the optical axis, as fractions of the mean distance of the bins."""
 MAX_REFINED_POSES = 6
 """Maximum number of poses of the search grid that are refined."""
+FLOOR_SIGNS = np.array([(-1, -1, 0), (-1, 1, 0), (1, 1, 0), (1, -1, 0)])
+"""Corners of the floor of a bin, in units of half its length and half its width `(4, 3)`."""
 REDUCTION = 4
 """Factor that reduces the size of the image and the number of samples for the search grid."""
 
@@ -118,6 +123,10 @@ def estimate_offset(frame: Frame, bins: Sequence[Bin]) -> CameraOffset | None:
         offset = _make_camera_offset(near_fit, frame, bins)
         if offset.outline_distance <= MAX_OUTLINE_DISTANCE:
             return offset
+    # A bin at its declared place shows that the camera is right, and that only other bins have been moved.
+    supports = fitter.compute_bin_supports([compute_bin_mask(frame, bin) for bin in bins])
+    if np.any((supports >= MIN_CERTAIN_SUPPORT).all(axis=1)):
+        return None
     # The edges near the expected outlines may belong to other objects, so that other poses are tried too.
     fits = [fit for fit in (near_fit, *fitter.search()) if fit is not None]
     best_fit = max(fits, key=lambda fit: fit.support, default=None)
@@ -137,6 +146,16 @@ def _make_camera_offset(fit: PoseFit, frame: Frame, bins: Sequence[Bin]) -> Came
         outline_distance=float((distances * samples.camera_points[:, 2]).mean() / frame.matrix[0, 0]),
         bins=tuple(bins[index].name for index in np.unique(samples.bin_indices)),
     )
+
+
+def compute_bin_mask(frame: Frame, bin: Bin, *, is_floor: bool = False) -> NDArray[np.bool_]:
+    """Return the mask `(H, W)` of the pixels of a bin, or of its floor without regard to its walls."""
+    corners = _list_corners(bin)
+    if is_floor:
+        corners = bin.position + (0.0, 0.0, BIN_THICKNESS) + bin.size / 2 * FLOOR_SIGNS
+    size = (frame.visible.shape[1], frame.visible.shape[0])
+    mask = compute_hull_mask(corners, frame.matrix, frame.X_WC, size, may_be_cut=True)
+    return np.zeros_like(frame.visible) if mask is None else mask
 
 
 class EdgeSamples(NamedTuple):
@@ -171,13 +190,19 @@ class PoseFit(NamedTuple):
     support: float
 
 
+@lru_cache(maxsize=1)
+def smooth_image(frame: Frame) -> NDArray[np.uint8]:
+    """Return the image of a frame after a Gaussian filter; several checks use the image of one frame."""
+    return np.asarray(cv2.GaussianBlur(frame.image, (0, 0), SMOOTHING_STD), dtype=np.uint8)
+
+
 class OutlineFitter:
     """Fits camera poses to the edges of one frame."""
 
     def __init__(self, frame: Frame, bins: Sequence[Bin]) -> None:
         self._frame = frame
         self._bins = bins
-        self._image = cv2.GaussianBlur(frame.image, (0, 0), SMOOTHING_STD)
+        self._image = smooth_image(frame)
 
     def refine(self, offset: Array, max_distances: Sequence[int] = FIT_EDGE_DISTANCES) -> PoseFit | None:
         """Return the fit that starts at a pose offset; None if too few samples or edges are visible.
@@ -200,6 +225,26 @@ class OutlineFitter:
         """Return the support of the pose with the given offset."""
         _, has_edge = self._find_edges(self._find_visible_samples(offset), SUPPORT_EDGE_DISTANCE)
         return float(has_edge.mean()) if len(has_edge) else 0.0
+
+    def compute_bin_supports(self, masks: Sequence[NDArray[np.bool_]]) -> Array:
+        """Return the support of each bin at the declared pose by direction of the normals `(B, 2)`.
+
+        Normals along the columns of the image are in column 0, normals along its rows in column 1: a bin that
+        has moved along one of its sides still covers the outlines of this side. Outlines behind another bin
+        do not count. A value is NaN if fewer than `MIN_BIN_SAMPLES` samples are visible. `masks` are the
+        results of `compute_bin_mask`.
+        """
+        samples = self._find_visible_samples(np.zeros(6))
+        _, has_edge = self._find_edges(samples, SUPPORT_EDGE_DISTANCE)
+        columns, rows = samples.pixels.astype(int).T
+        is_in_other_bin = np.zeros(len(has_edge), dtype=bool)
+        for index, mask in enumerate(masks):
+            is_in_other_bin |= mask[rows, columns] & (samples.bin_indices != index)
+        groups = 2 * samples.bin_indices + (np.abs(samples.normals[:, 0]) > np.abs(samples.normals[:, 1]))
+        counts = np.bincount(groups[~is_in_other_bin], minlength=2 * len(self._bins))
+        edge_counts = np.bincount(groups[~is_in_other_bin & has_edge], minlength=2 * len(self._bins))
+        supports = np.where(counts >= MIN_BIN_SAMPLES, edge_counts / np.maximum(counts, 1), np.nan)
+        return supports.reshape(-1, 2)
 
     def search(self) -> Iterator[PoseFit]:
         """Yield fits that start at the poses of the search grid with the strongest edges at the outlines."""
@@ -283,10 +328,7 @@ def _sample_outlines(bins: Sequence[Bin], X_WC: Pose, matrix: Array) -> tuple[Ar
     next_points = [np.zeros((0, 3))]
     bin_indices = [np.zeros(0, dtype=np.intp)]
     for index, bin in enumerate(bins):
-        half_size = np.array([*(bin.size[:2] / 2 + BIN_THICKNESS), bin.size[2] / 2])
-        # The first four corners belong to the rim.
-        signs = [(*xy, z) for z in (1, -1) for xy in ((-1, -1), (-1, 1), (1, 1), (1, -1))]
-        corners = bin.position + (0.0, 0.0, half_size[2]) + half_size * signs
+        corners = _list_corners(bin)
         corners_C = X_WC.inverse().apply(corners)
         if np.any(corners_C[:, 2] < NEAR_PLANE):
             continue
@@ -301,6 +343,13 @@ def _sample_outlines(bins: Sequence[Bin], X_WC: Pose, matrix: Array) -> tuple[Ar
             next_points.append(corners[start] + (fractions + 0.01) * (corners[end] - corners[start]))
             bin_indices.append(np.full(count, index, dtype=np.intp))
     return np.concatenate(points), np.concatenate(next_points), np.concatenate(bin_indices)
+
+
+def _list_corners(bin: Bin) -> Array:
+    """Return the corners of the outer box of a bin `(8, 3)` [m]; the first four belong to the rim."""
+    half_size = np.array([*(bin.size[:2] / 2 + BIN_THICKNESS), bin.size[2] / 2])
+    signs = [(*xy, z) for z in (1, -1) for xy in ((-1, -1), (-1, 1), (1, 1), (1, -1))]
+    return np.asarray(bin.position + (0.0, 0.0, half_size[2]) + half_size * signs)
 
 
 def _project(camera_points: Array, matrix: Array) -> Array:

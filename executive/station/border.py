@@ -220,6 +220,7 @@ METHODS: Mapping[str, Input] = {
     "camera.sees_table": Input("camera.sees_table"),
     "camera.describe_displacement": Input("camera.displacement"),
     "camera.find_unexplained": Input("camera.regions", REGIONS),
+    "camera.check_bins": Input("camera.bins"),
     "detector.request": COMMAND,
     "request.result": Input("detector.{name}", ANSWER),
     "operator.ask": Input("operator"),
