@@ -15,11 +15,10 @@ from executive.cell.objects import BIN_THICKNESS, Bin, Quotas, is_quota_reached
 from executive.cell.protocols import Presence, Routes
 from executive.geometry import Array
 from executive.ledger.belief import make_viewpoint_key
+from executive.ledger.certainty import REASON_CONTRADICTED
 from executive.ledger.item import ItemRecord, ItemRecords, State
 from executive.ledger.look import MAX_STANDARD_DEVIATIONS
 
-REASON_CONTRADICTED = "images contradict the declared place or colour of"
-"""Start of the reason of the state REJECTED of an item without a bin that may be used."""
 REASON_PROBABLY_FELL = "it probably fell into the bin"
 """Reason of the state PLACED of a dropped item that no look has shown in the bin."""
 WALL_MARGIN = 0.035

@@ -10,6 +10,8 @@ from executive.cell.config import LedgerConfig
 from executive.cell.tools import ToolMeasurement
 from executive.ledger.item import ON_TABLE, REASON_NOT_FOUND, REASON_UNCERTAIN, ItemRecord, State
 
+REASON_CONTRADICTED = "images contradict the declared place or colour of"
+"""Start of the reason of the state REJECTED of an item without a bin that may be used."""
 MIN_EXISTENCE_PROBABILITY = 0.9
 """Minimum probability of existence of an item that is picked, or matched to a moved item."""
 MIN_P_VALUE = 0.01
@@ -162,7 +164,8 @@ class Certainty:
         5. A dropped item that the tool may have moved while the journal was incomplete is rejected.
         6. An item is lost if it was dropped, or if its position on the table is now empty.
         7. An item that is already rejected stays rejected.
-        8. An item whose class has no route, or no bin below its quota, is skipped.
+        8. An item whose class has no route, or no bin below its quota, is skipped; it is rejected if images
+           contradict a bin of its class.
         9. If the mission was completed, an item with sufficient evidence (`is_certain`), no failed attempt
            and no evidence against its class is skipped, because a quota was reached or the operator quit.
         10. Any other item is rejected.
@@ -190,7 +193,8 @@ class Certainty:
         if record.state is State.REJECTED:
             return None
         if skip_reason:
-            return State.SKIPPED, skip_reason
+            is_contradicted = skip_reason.startswith(REASON_CONTRADICTED)
+            return State.REJECTED if is_contradicted else State.SKIPPED, skip_reason
         had_problem = record.failed_pick_count or record.last_contradiction
         if is_completed and self.is_certain(record) and not had_problem:
             return State.SKIPPED, "the mission was completed without it"

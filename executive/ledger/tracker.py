@@ -17,12 +17,7 @@ from executive.cell.tools import ToolMeasurement
 from executive.errors import Fault
 from executive.events import BinsEmptied, Emit, ItemChanged
 from executive.geometry import Array
-from executive.ledger.bin_contents import (
-    REASON_CONTRADICTED,
-    REASON_PROBABLY_FELL,
-    BinContents,
-    find_probable_bin,
-)
+from executive.ledger.bin_contents import REASON_PROBABLY_FELL, BinContents, find_probable_bin
 from executive.ledger.certainty import FINAL_STATES, Certainty, discard_moved_items
 from executive.ledger.coverage import Coverage
 from executive.ledger.item import ON_TABLE, ItemRecord, ItemRecords, State
@@ -268,13 +263,10 @@ class Tracker:
         dropped_items = [record for record in dropped if not record.was_taken_away]
         for record in self._records.all:
             self._settle_undeclared(record)
-            skip_reason = self._explain_skipped_item(record)
             final_state = self._certainty.find_final_state(
-                record, skip_reason=skip_reason,
+                record, skip_reason=self._explain_skipped_item(record),
                 is_completed=completed, has_confirmed_item=has_confirmed_item,
             )  # fmt: skip
-            if final_state == (State.SKIPPED, skip_reason) and skip_reason.startswith(REASON_CONTRADICTED):
-                final_state = (State.REJECTED, skip_reason)
             if bin := find_probable_bin(record):
                 record.bin = bin
                 final_state = (State.PLACED, REASON_PROBABLY_FELL)

@@ -78,8 +78,6 @@ AXIAL_SHIFTS = np.linspace(-0.21, 0.21, 7)
 """Translations of the search grid along the optical axis, as fractions of the mean distance of the bins."""
 MAX_REFINED_POSES = 6
 """Maximum number of poses of the search grid that are refined."""
-FLOOR_SIGNS = np.array([(-1, -1, 0), (-1, 1, 0), (1, 1, 0), (1, -1, 0)])
-"""Corners of the floor of a bin, in units of half its length and half its width `(4, 3)`."""
 REDUCTION = 4
 """Factor that reduces the size of the image and the number of samples for the search grid."""
 
@@ -123,10 +121,13 @@ def estimate_offset(frame: Frame, bins: Sequence[Bin]) -> CameraOffset | None:
         offset = _make_camera_offset(near_fit, frame, bins)
         if offset.outline_distance <= MAX_OUTLINE_DISTANCE:
             return offset
-    # A bin at its declared place shows that the camera is right, and that only other bins have been moved.
-    supports = fitter.compute_bin_supports([compute_bin_mask(frame, bin) for bin in bins])
-    if np.any((supports >= MIN_CERTAIN_SUPPORT).all(axis=1)):
-        return None
+    else:
+        # If half of the bins are at their declared places, the camera is right, and other bins were moved.
+        supports = fitter.compute_bin_supports([compute_bin_mask(frame, bin) for bin in bins])
+        has_support = np.fmin.reduce(supports, axis=1) >= MIN_CERTAIN_SUPPORT
+        visible_count = (~np.isnan(supports).all(axis=1)).sum()
+        if has_support.any() and 2 * has_support.sum() >= visible_count:
+            return None
     # The edges near the expected outlines may belong to other objects, so that other poses are tried too.
     fits = [fit for fit in (near_fit, *fitter.search()) if fit is not None]
     best_fit = max(fits, key=lambda fit: fit.support, default=None)
@@ -148,13 +149,10 @@ def _make_camera_offset(fit: PoseFit, frame: Frame, bins: Sequence[Bin]) -> Came
     )
 
 
-def compute_bin_mask(frame: Frame, bin: Bin, *, is_floor: bool = False) -> NDArray[np.bool_]:
-    """Return the mask `(H, W)` of the pixels of a bin, or of its floor without regard to its walls."""
-    corners = _list_corners(bin)
-    if is_floor:
-        corners = bin.position + (0.0, 0.0, BIN_THICKNESS) + bin.size / 2 * FLOOR_SIGNS
+def compute_bin_mask(frame: Frame, bin: Bin) -> NDArray[np.bool_]:
+    """Return the mask `(H, W)` of the pixels of a bin."""
     size = (frame.visible.shape[1], frame.visible.shape[0])
-    mask = compute_hull_mask(corners, frame.matrix, frame.X_WC, size, may_be_cut=True)
+    mask = compute_hull_mask(_list_corners(bin), frame.matrix, frame.X_WC, size, may_be_cut=True)
     return np.zeros_like(frame.visible) if mask is None else mask
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -12,6 +13,7 @@ from executive.cell.config import BinConfig
 from executive.cell.frame import Frame
 from executive.cell.objects import BIN_THICKNESS, Bin
 from executive.geometry import Array, Pose
+from executive.perception.bin_check import check_bins
 from executive.perception.camera_check import MAX_OUTLINE_DISTANCE, describe_displacement, estimate_offset
 from executive.perception.camera_model import compute_camera_matrix, project
 from tests.camera_poses import looking_down
@@ -24,6 +26,7 @@ BINS = [
     BinConfig(position=place, size=(0.24, 0.30, 0.06), colour=(1.0, 1.0, 1.0), slots=(1, 1)).build_bin(name)
     for name, place in PLACES.items()
 ]
+DECLARED_BINS = [replace(bin, colour=tuple(np.array(COLOURS[bin.name]) / 255)) for bin in BINS]
 
 
 def draw(X_WC: Pose, *, light: float = 1.0, bins: list[Bin] = BINS, matrix: Array = MATRIX) -> Frame:
@@ -112,3 +115,32 @@ def test_darkness_a_straight_line_and_an_arm_do_not_say_where_a_camera_is(
     frame = draw(move((0.03, 0.0, 0.0)), light=light)
     frame.visible[:, :hidden_width] = False
     assert estimate_offset(frame, BINS) is None
+
+
+def test_only_the_bin_that_was_moved_contradicts_and_the_words_say_how_far() -> None:
+    away = Bin("yellow", BINS[2].position + np.array([0.05, -0.08, 0.0]), BINS[2].size, BINS[2].slots)
+    found = check_bins(draw(DECLARED, bins=[*BINS[:2], away]), DECLARED_BINS)
+    assert (found["red"], found["blue"]) == ("", "")
+    assert re.search(
+        r"yellow is not at its declared place: .* is \(\+(4|5)\d, -(7|8)\d\) mm away", found["yellow"]
+    )
+
+
+def test_a_bin_that_is_gone_has_no_other_place() -> None:
+    assert (
+        "no outline of its size is near by" in check_bins(draw(DECLARED, bins=BINS[1:]), DECLARED_BINS)["red"]
+    )
+
+
+def test_exchanged_bins_have_the_colours_of_each_other() -> None:
+    exchanged = [replace(BINS[0], name="blue"), replace(BINS[1], name="red"), BINS[2]]
+    found = check_bins(draw(DECLARED, bins=exchanged, light=0.6), DECLARED_BINS)
+    assert "from that of blue" in found["red"] and "from that of red" in found["blue"]
+    assert found["yellow"] == ""
+
+
+def test_the_arm_and_darkness_are_no_evidence_about_bins() -> None:
+    frame = draw(DECLARED, bins=BINS[:2])
+    frame.visible[:300] = False
+    assert "yellow" not in check_bins(frame, DECLARED_BINS)
+    assert check_bins(draw(DECLARED, bins=BINS[:2], light=0.15), DECLARED_BINS) == {}

@@ -9,9 +9,11 @@ from at_hand import intercept
 
 from executive.cell.objects import Target
 from executive.drivers.fake import FakeTool
+from executive.manipulation.tool_goals import choose_bin
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach
+from skills.detect import Detect
 from skills.grasp import Grasp
 from skills.items import MIN_DROPS_OF_HEAVY_OBJECT, RejectTarget
 from skills.move_to_scan import MoveToScan
@@ -165,3 +167,17 @@ def test_taken_away_while_it_lets_go_it_has_placed_what_fell(fake: FakeCell, hel
     again = run_skill(Release(held=held, bin="red_bin"), fake)
     assert (again.status, again.outputs, again.ticks) == ("SUCCESS", {"placed": held}, 0)
     assert fake.ledger.count_objects_in("red_bin") == 1
+
+
+def test_a_contradicted_bin_is_named_and_gets_no_item_until_an_image_confirms_it(
+    fake: FakeCell, held: str, look: Look
+) -> None:
+    intercept(fake, "camera.check_bins", lambda frame: {"red_bin": "red_bin is gone"})
+    run_skill(Detect(view="full"), fake)
+    result = run_skill(Transit(held=held, bin="red_bin"), fake)
+    assert (result.reason, result.message) == ("bin_missing", "red_bin is gone")
+    assert choose_bin(fake.cell, held) == ""
+    assert [event.text for event in fake.ledger.unexplained.events] == ["red_bin is gone"]
+    intercept(fake, "camera.check_bins", lambda frame: {"red_bin": ""})
+    run_skill(Detect(view="full"), fake)
+    assert (choose_bin(fake.cell, held), fake.ledger.unexplained.events) == ("red_bin", [])

@@ -133,10 +133,8 @@ class SceneBinConfig(Section):
 
     missing: bool = False
     """True if there is no such bin."""
-    at: str | None = None
-    """Name of the bin of the cell file at whose declared place this bin stands; by default its own."""
     shift: tuple[Displacement, Displacement] = (0.0, 0.0)
-    """Displacement x, y [m] from that place, each -1 to 1."""
+    """Displacement x, y [m] from the place in the cell file, each -1 to 1."""
     colour: Colour | None = None
     """Colour of the walls: r, g, b, each 0 to 1; by default that of the cell file."""
 
@@ -210,12 +208,10 @@ def _find_cell_findings(scene: SceneConfig, root: YamlNode, config: CellConfig) 
             span = find_span(root, ("objects", label), at_key=True)
             hint = suggest_choice(label, (*config.objects, ANY_CLASS), "Valid keys")
             yield make_error(span, "unknown-class", f'the cell {config.cell} has no class "{label}"', hint)
-    for name, section in scene.bins.items():
-        for unknown, keys in ((name, ()), (section.at or name, ("at",))):
-            if unknown not in config.bins:
-                span = find_span(root, ("bins", name, *keys), at_key=not keys)
-                hint = suggest_choice(unknown, config.bins, "Valid bins")
-                yield make_error(span, "unknown-bin", f'the cell {config.cell} has no bin "{unknown}"', hint)
+    for name in set(scene.bins) - set(config.bins):
+        span = find_span(root, ("bins", name), at_key=True)
+        hint = suggest_choice(name, config.bins, "Valid bins")
+        yield make_error(span, "unknown-bin", f'the cell {config.cell} has no bin "{name}"', hint)
     name, camera = next(iter(config.cameras.items()))
     if any(scene.camera.orbit_deg) and camera.mount != "fixed":
         yield make_error(
@@ -246,19 +242,20 @@ def apply_scene(config: CellConfig, scene: SceneConfig) -> CellConfig:
     table = config.table.model_copy(update=table_changes)
     objects = {label: _change_object(label, model, scene) for label, model in config.objects.items()}
     cameras = {name: _change_camera(camera, scene) for name, camera in config.cameras.items()}
-    bins = {
-        name: _change_bin(bin, scene.bins[name], config) if name in scene.bins else bin
-        for name, bin in config.bins.items()
-        if name not in scene.bins or not scene.bins[name].missing
-    }
-    changes = {"table": table, "objects": objects, "bins": bins, "cameras": cameras}
+    bins = {name: _change_bin(bin, scene.bins.get(name)) for name, bin in config.bins.items()}
+    present_bins = {name: bin for name, bin in bins.items() if bin is not None}
+    changes = {"table": table, "objects": objects, "bins": present_bins, "cameras": cameras}
     return config.model_copy(update=changes)
 
 
-def _change_bin(bin: BinConfig, section: SceneBinConfig, config: CellConfig) -> BinConfig:
-    x, y, z = config.bins[section.at].position if section.at else bin.position
+def _change_bin(bin: BinConfig, section: SceneBinConfig | None) -> BinConfig | None:
+    """Return the true bin, or None if it is missing."""
+    if section is None:
+        return bin
+    x, y, z = bin.position
     position = (x + section.shift[0], y + section.shift[1], z)
-    return bin.model_copy(update={"position": position, "colour": section.colour or bin.colour})
+    changes = {"position": position, "colour": section.colour or bin.colour}
+    return None if section.missing else bin.model_copy(update=changes)
 
 
 def _change_object(label: str, model: ObjectConfig, scene: SceneConfig) -> ObjectConfig:

@@ -161,6 +161,16 @@ def turned(axis: str, angle: float) -> np.ndarray:
     return np.asarray(cv2.Rodrigues(vector)[0])
 
 
+def test_the_audit_knows_the_true_bins_and_the_ledger_the_declared_ones(cell: Callable[..., Station]) -> None:
+    bins = {"red_bin": {"shift": [0, 0.96]}, "blue_bin": {"missing": True}}
+    station = cell(bins=bins)
+    thing = station.driver.list_objects()[0]
+    place = station.cell.bins["blue_bin"].position
+    x, y, _ = place - thing.position
+    station.driver.move_object(thing, (float(x), float(y)))
+    assert next(iter(station.driver.list_final_objects())).bin == "red_bin"
+
+
 @pytest.mark.parametrize(
     ("error", "zoom", "moved"),
     [
