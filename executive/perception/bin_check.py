@@ -24,7 +24,7 @@ MAX_CONTRADICTING_SUPPORT = 0.45
 """Maximum support, in one direction, of a bin that is not at its place.
 
 In 65 frames of five cells with bins as declared, empty and filled, the support was at least 0.8. In frames of
-fixed cameras, the check contradicted all 24 missing bins and 121 of 128 bins that had moved by 20 to 300 mm.
+fixed cameras, the check contradicted all 24 missing bins and 120 of 128 bins that had moved by 20 to 300 mm.
 In 193 frames in the lights of tests/benchmarks/scenes.yaml, only glare led to false contradictions (two).
 """
 MIN_BRIGHTNESS = 60.0
