@@ -64,6 +64,7 @@ def check_bins(frame: Frame, bins: Sequence[Bin]) -> dict[str, str]:
     A bin that the frame does not show well enough is missing in the result.
     """
     verdicts: dict[str, str] = {}
+    suspects: dict[str, str] = {}
     if np.percentile(frame.image[::8, ::8].max(axis=2), 90) < MIN_BRIGHTNESS:
         return verdicts
     masks = [compute_bin_mask(frame, bin) for bin in bins]
@@ -81,10 +82,15 @@ def check_bins(frame: Frame, bins: Sequence[Bin]) -> dict[str, str]:
                     "back, or correct the cell file"
                 )
             continue
-        contradiction = _describe_colour(frame, bins, masks, index)
-        if contradiction or (contradiction == "" and np.all(bin_supports >= MIN_SUPPORT)):
-            verdicts[bin.name] = contradiction
-    return verdicts
+        owner = _find_colour_owner(frame, bins, masks, index)
+        if owner not in (None, bin.name):
+            text = f"the bin at the place of {bin.name} has the colour of {owner or 'no bin'}"
+            verdicts[bin.name] = f"{text}; exchange the bins, or correct the cell file"
+            suspects[owner or bin.name] = verdicts[bin.name]
+        elif owner == bin.name and np.all(bin_supports >= MIN_SUPPORT):
+            verdicts[bin.name] = ""
+    # A bin whose colour appears at the place of another one is probably elsewhere, too.
+    return suspects | verdicts
 
 
 def _describe_place(frame: Frame, bin: Bin, bins: Sequence[Bin]) -> str:
@@ -123,17 +129,18 @@ def _describe_place(frame: Frame, bin: Bin, bins: Sequence[Bin]) -> str:
     )
 
 
-def _describe_colour(
+def _find_colour_owner(
     frame: Frame, bins: Sequence[Bin], masks: Sequence[NDArray[np.bool_]], index: int
 ) -> str | None:
-    """Return a contradiction if the bin `index` has another colour than declared, else "".
+    """Return the name of the bin whose declared colour appears at the place of the bin `index`.
 
-    None if too little of the bin is visible. A grey bin may have any colour. `masks` show the bins.
+    The result is the bin itself if it is grey, "" for a colour of no bin, and None if too little of the bin
+    is visible. `masks` show the bins.
     """
     bin = bins[index]
     declared = _compute_chromaticity(bin.colour)
     if np.linalg.norm(declared - GREY) < MIN_SATURATION:
-        return ""
+        return bin.name
     # A quarter of the pixels suffices.
     is_shown = masks[index] & frame.visible & (np.sum(masks, axis=0) == 1)
     pixels = frame.image[::2, ::2][is_shown[::2, ::2]]
@@ -141,14 +148,10 @@ def _describe_colour(
         return None
     observed = _compute_chromaticity(np.median(pixels, axis=0))
     errors = [float(np.linalg.norm(observed - _compute_chromaticity(other.colour))) for other in bins]
-    if errors[index] <= min(MAX_CHROMATICITY_ERROR, min(errors) + MIN_CHROMATICITY_GAIN):
-        return ""
-    nearest = bins[errors.index(min(errors))].name
-    return (
-        f"the bin at the place of {bin.name} has another colour than declared: its chromaticity differs by "
-        f"{errors[index]:.2f} from the declared one, at most {MAX_CHROMATICITY_ERROR} is allowed, and by "
-        f"{min(errors):.2f} from that of {nearest}; exchange the bins, or correct the cell file"
-    )
+    smallest = min(errors)
+    if errors[index] > smallest + MIN_CHROMATICITY_GAIN:
+        return bins[errors.index(smallest)].name
+    return bin.name if errors[index] <= MAX_CHROMATICITY_ERROR else ""
 
 
 def _compute_chromaticity(colour: ArrayLike) -> Array:
