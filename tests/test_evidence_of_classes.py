@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +11,8 @@ import pytest
 
 from executive.cell.frame import Box, Detection, Detections, ErrorRates, Frame
 from executive.cell.objects import ObjectClass
+from executive.geometry import rotate_about_z
+from executive.perception.camera_model import project
 from executive.perception.evidence import (
     describe_size_contradiction,
     describe_top_contradiction,
@@ -21,6 +25,7 @@ CUBE, SPHERE = ObjectClass("cube", 0.05, 0.0354), ObjectClass("sphere", 0.06, 0.
 CLASSES = {
     "cube": CUBE, "sphere": SPHERE, "duck": ObjectClass("duck", 0.056, 0.0295),
 }  # fmt: skip
+STACKED = (0.0, 0.05, 0.056, 0.06)
 FRAME = Frame(
     1, "overhead", np.zeros((480, 640, 3), np.uint8), None,
     np.array([[461.0, 0, 319.5], [0, 461.0, 239.5], [0, 0, 1]]), looking_down((0.5, 0.0, 1.2)), 0.0,
@@ -41,6 +46,17 @@ def test_the_size_of_a_box_has_to_be_that_of_the_class(side, contradiction):
     box = (319.5 - side / 2, 239.5 - side / 2, 319.5 + side / 2, 239.5 + side / 2)
     place = np.array([0.5, 0.0, 0.03])
     assert describe_size_contradiction(Detection("sphere", 0.9, box), place, FRAME, SPHERE) == contradiction
+
+
+@pytest.mark.parametrize("yaw_deg", [0, 20, 45, 70])
+@pytest.mark.parametrize(("length", "fits"), [(0.05, True), (0.08, False), (0.09, False)])
+def test_both_sides_of_a_box_have_to_fit_the_footprint_at_one_yaw(yaw_deg, length, fits):
+    place = np.array([0.6, 0.15, 0.025])
+    corners = np.array([*itertools.product((-1, 1), repeat=3)]) * (length / 2, 0.025, 0.025)
+    pixels = project(FRAME.matrix, FRAME.X_WC, place + corners @ rotate_about_z(math.radians(yaw_deg)).T)
+    box = Detection("cube", 0.9, (*pixels.min(axis=0), *pixels.max(axis=0)))
+    cube = replace(CUBE, footprint=(0.05, 0.05))
+    assert (describe_size_contradiction(box, place, FRAME, cube) == "") is fits
 
 
 def observe_sphere(box: Box, frame: Frame) -> str:
@@ -73,10 +89,11 @@ def show_top(height: float, camera: float = 1.2) -> Frame:
     return replace(FRAME, depth=depth, X_WC=looking_down((0.5, 0.0, camera)))
 
 
-def describe_top(label: str, frame: Frame) -> str:
+def describe_top(label: str, frame: Frame, supports: tuple[float, ...] = STACKED) -> str:
     """Return how the top in a box contradicts the class of an object on the table."""
     place = np.array([0.5, 0.0, 0.025])
-    return describe_top_contradiction(Detection(label, 0.9, BOX), place, frame, CLASSES)
+    stacked = replace(CLASSES[label], support_heights=supports)
+    return describe_top_contradiction(Detection(label, 0.9, BOX), place, frame, stacked)
 
 
 @pytest.mark.parametrize(
@@ -87,17 +104,23 @@ def describe_top(label: str, frame: Frame) -> str:
         (
             "cube",
             0.08,
-            "its top is 80 mm above the table, and the top of a cube is at 50, 100, 106 or 110 mm",
+            "its top is 80 mm above the table, and the top of a cube is at 50, 100, 106, 110 mm",
         ),
         (
             "duck",
             0.02,
-            "its top is 20 mm above the table, and the top of a duck is at 56, 106, 112 or 116 mm",
+            "its top is 20 mm above the table, and the top of a duck is at 56, 106, 112, 116 mm",
         ),
     ],
 )
 def test_the_height_of_a_top_in_the_depth_image_has_to_be_that_of_the_class(label, height, contradiction):
     assert describe_top(label, show_top(height)) == contradiction
+
+
+def test_a_tower_is_no_stack_in_a_cell_without_stacks():
+    assert describe_top("cube", show_top(0.1)) == ""
+    tower = describe_top("cube", show_top(0.1), supports=(0.0,))
+    assert tower == "its top is 100 mm above the table, and the top of a cube is at 50 mm"
 
 
 @pytest.mark.parametrize("depth", [None, np.full((480, 640), np.nan)])

@@ -162,8 +162,7 @@ def measure_detector(
     localizer = None
     # The method `ray` needs a simulated world.
     if cell_of_images and cell_of_images.localization != "ray":
-        objects = {label: entry.build_class(label) for label, entry in cell_of_images.objects.items()}
-        localizer = CellLocalizer(cell_of_images.localization, objects)
+        localizer = CellLocalizer(cell_of_images.localization, cell_of_images.build_classes())
     name = detector.name
     if settings.dataset is not None:
         known_classes = classes or find_detectable_labels(detector.configs, detector.base_folder)[name] or ()

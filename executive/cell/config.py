@@ -69,6 +69,9 @@ class ObjectConfig(Section):
     """Height of the object as it lies on the table [m]."""
     radius: Length
     """Radius of the circle around the outline of the object, seen from above [m]."""
+    footprint: tuple[Length, Length] | None = None
+    """Length and width of the rectangle around the outline of the object, seen from above [m]. If given, both
+    sides of a detected box must fit it at some yaw, otherwise only the longer side must fit the radius."""
     ring: Distance = 0.0
     """Distance of the contact point from the centre [m]; above 0 only for parts with a hole."""
     colours: tuple[Colour, ...] = ((1.0, 1.0, 1.0),)
@@ -76,7 +79,9 @@ class ObjectConfig(Section):
 
     def build_class(self, label: str) -> ObjectClass:
         """Return the declared object class; if the section declares no mass, with the default mass."""
-        object_class = ObjectClass(label, self.height, self.radius, self.ring, looks_like=self.looks_like)
+        object_class = ObjectClass(
+            label, self.height, self.radius, self.ring, looks_like=self.looks_like, footprint=self.footprint
+        )
         if self.mass is None:
             return object_class
         return replace(object_class, mass=self.mass, mass_std=self.mass_std)
@@ -89,6 +94,8 @@ class ObjectConfig(Section):
             raise ValueError(
                 f"has a ring of {self.ring:g} m, which must be smaller than the radius, {self.radius:g} m"
             )
+        if self.footprint and max(self.footprint) > 2 * self.radius:
+            raise ValueError(f"has a footprint longer than its diameter, 2 x {self.radius:g} m")
         return self
 
 
@@ -263,6 +270,14 @@ class CellConfig(Section):
         """Tool height [m] at which a held object of any class clears all bin walls and piles."""
         wall_top = max(bin.position[2] + bin.size[2] for bin in self.bins.values())
         return max(wall_top, self.max_pile_height) + self.max_hold_height + self.motion.clearance
+
+    def build_classes(self) -> dict[str, ObjectClass]:
+        """Return the classes by label; objects lie on others only in a cell with `stacked` above 0."""
+        classes = {label: section.build_class(label) for label, section in self.objects.items()}
+        if not self.table.stacked:
+            return classes
+        heights = (0.0, *(object_class.height for object_class in classes.values()))
+        return {label: replace(each, support_heights=heights) for label, each in classes.items()}
 
     def build_bins(self) -> dict[str, Bin]:
         """Return the bins by name."""

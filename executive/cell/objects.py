@@ -117,6 +117,8 @@ class ObjectClass:
         mass_std: Standard deviation of the mass between the objects of the class [kg]; infinite if the cell
             file declares no mass.
         looks_like: Class whose label the detectors report for objects of this class; "": this class.
+        footprint: Length and width of the rectangle around the outline, seen from above [m]; None: unknown.
+        support_heights: Heights above the table of the surfaces on which an object of the class may lie [m].
     """
 
     label: str
@@ -126,20 +128,18 @@ class ObjectClass:
     mass: float = 0.1
     mass_std: float = math.inf
     looks_like: str = ""
+    footprint: tuple[float, float] | None = None
+    support_heights: tuple[float, ...] = (0.0,)
+
+    @property
+    def top_heights(self) -> list[float]:
+        """Possible heights above the table of the top of an object of the class [m], ascending."""
+        return sorted({self.height + support_height for support_height in self.support_heights})
 
     @property
     def detected_label(self) -> str:
         """Class whose label the detectors report for objects of this class."""
         return self.looks_like or self.label
-
-
-def list_top_heights(label: str, classes: Mapping[str, ObjectClass]) -> list[float]:
-    """Return all possible heights above the table [m] of the top of an object of a class, ascending.
-
-    The object may stand on the table or on one object of any class.
-    """
-    support_heights = {0.0, *(object_class.height for object_class in classes.values())}
-    return sorted(classes[label].height + support_height for support_height in support_heights)
 
 
 @dataclass(frozen=True)

@@ -255,7 +255,7 @@ class FakeDriver:
         options: DriverOptions = DriverOptions(),
         clock: StepClock | WallClock | None = None,
     ) -> None:
-        classes = {label: section.build_class(label) for label, section in config.objects.items()}
+        classes = config.build_classes()
         self.world = FakeWorld(classes, config.build_bins().values())
         put_random_objects(self.world, config, options.seed)
         self.clock = clock or StepClock(config.clock.step)

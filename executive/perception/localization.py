@@ -97,7 +97,7 @@ class CellLocalizer:
         object_class = self.classes[detection.label]
         size_contradiction = evidence.describe_size_contradiction(detection, position, frame, object_class)
         return size_contradiction or evidence.describe_top_contradiction(
-            detection, position, frame, self.classes
+            detection, position, frame, object_class
         )
 
     def _find_height(self, detection: Detection, frame: Frame) -> float:

@@ -133,7 +133,7 @@ class Station:
         self._emptied_ticks: dict[str, int] = {}
         """Tick in which a bin was emptied, by name, until its objects disappear."""
         bins = config.build_bins()
-        classes = {label: section.build_class(label) for label, section in config.objects.items()}
+        classes = config.build_classes()
         ignored_labels = set(config.unknown.ignore).difference(classes)
         self.ledger = Tracker(
             config.ledger,

@@ -13,7 +13,7 @@ from pydantic import Field
 
 from executive.cell.arm import Goal
 from executive.cell.device_config import Force, Length, MotionConfig
-from executive.cell.objects import ObjectClass, Target, list_top_heights
+from executive.cell.objects import ObjectClass, Target
 from executive.cell.tools import OVERTRAVEL, GraspAttempt, GraspPose, ToolMeasurement, ToolModel, ToolPart
 from executive.geometry import Array, Pose
 
@@ -120,7 +120,7 @@ class Suction(ToolModel):
         `overtravel` below its top. It may have hit the object below the top if it is too low for the assumed
         class, and no class has this height.
         """
-        errors = {label: _compute_height_error(label, height, classes) for label in classes}
+        errors = {label: _compute_height_error(other, height) for label, other in classes.items()}
         error = errors[object_class.label]
         if abs(error) <= MAX_TOUCH_HEIGHT_ERROR:
             return ToolMeasurement()
@@ -161,9 +161,9 @@ def _compute_min_contact_height(object_class: ObjectClass, centre_height: float,
     return max(centre_height + object_class.height / 2 - overtravel, centre_height)
 
 
-def _compute_height_error(label: str, height: float, classes: Mapping[str, ObjectClass]) -> float:
+def _compute_height_error(object_class: ObjectClass, height: float) -> float:
     """Return `height` [m] minus the nearest possible height of the top of an object of a class."""
-    return min((height - top for top in list_top_heights(label, classes)), key=abs)
+    return min((height - top for top in object_class.top_heights), key=abs)
 
 
 RIM_RAY_COUNT = 16

@@ -17,8 +17,8 @@ from executive.tools.suction import CupContact, Suction, compute_breakaway_force
 REACH = 0.002
 TOOL = Suction(cup_radius=0.006, reach=REACH, force=8.0, gap=0.004, tilt_deg=60, min_force=1.0, source="test")
 CLASSES = {
-    "cube": ObjectClass("cube", 0.05, 0.0354), "sphere": ObjectClass("sphere", 0.06, 0.03),
-    "duck": ObjectClass("duck", 0.056, 0.0295),
+    "cube": ObjectClass("cube", 0.05, 0.0354, support_heights=(0.0, 0.05)),
+    "sphere": ObjectClass("sphere", 0.06, 0.03), "duck": ObjectClass("duck", 0.056, 0.0295),
 }  # fmt: skip
 
 
@@ -98,6 +98,7 @@ def measure(label: str, height: float) -> ToolMeasurement:
         ("cube", 0.0504, ""),
         ("cube", 0.1004, ""),  # on another cube
         ("cube", 0.06, "it was touched 60 mm above the table, and a cube is 50 mm high"),
+        ("sphere", 0.11, "it was touched 110 mm above the table, and a sphere is 60 mm high"),
         ("sphere", 0.056, "it was touched 56 mm above the table, and a sphere is 60 mm high"),
     ],
 )

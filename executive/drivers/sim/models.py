@@ -303,7 +303,9 @@ def _place_mesh(config: ObjectConfig, X_OL: Pose, tag: str = "visual") -> Mesh:
 def scale_model(model: ObjectConfig, factor: float) -> ObjectConfig:
     """Return the model of an object scaled by `factor`."""
     names = ("scale", "height", "radius", "ring")
-    return model.model_copy(update={name: getattr(model, name) * factor for name in names})
+    sizes = {name: getattr(model, name) * factor for name in names}
+    footprint = model.footprint and tuple(side * factor for side in model.footprint)
+    return model.model_copy(update={**sizes, "footprint": footprint})
 
 
 @cache
