@@ -29,7 +29,8 @@ class Approach(Skill):
     class of the target, unless an earlier measurement agreed with the class; the skill then fails with
     `contradicted`. The first measurement that may be wrong is no contradiction if the detections alone prove
     the class. A contact at which the tool cannot grip the object, for instance below its centre or more than
-    `overtravel` below its top, is a miss; the skill then fails with `no_contact`.
+    `overtravel` below its top, is a miss; the skill then fails with `no_contact`. It also does at a contact
+    during the fast motion, whose height cannot be measured; the next approach is slow.
     """
 
     target: In[Target] = port(doc="the target to touch")
@@ -57,10 +58,24 @@ class Approach(Skill):
         grasp, _ = find_grasp()
         # The zero of a load cell drifts; only before the descent, the tool is at rest and certainly empty.
         cell.ledger.record_empty_load(tool.load)
-        yield from follow(self, cell, motion, MotionGuard(touch=grasp.guard == "touch"))
+        first_touch_height = 0.0
+
+        def record_first_touch() -> bool:
+            nonlocal first_touch_height
+            # The border records each read of the tool pose, so the pose is read only once per contact.
+            if not tool.touching:
+                first_touch_height = 0.0
+            elif not first_touch_height:
+                first_touch_height = float(cell.arm.tool_pose.position[2])
+            return False
+
+        guard = MotionGuard(touch=grasp.guard == "touch")
+        yield from follow(self, cell, motion, guard, until=record_first_touch)
+        record_first_touch()
         object_class = cell.classes[self.target.label]
         height = float(cell.arm.tool_pose.position[2])
         start_height = grasp.goal.position[2] + grasp.goal.guarded_length
+        fast_end_height = start_height - grasp.goal.fast_length
         expectation = f"was expected at {grasp.contact_height * 1000:.0f} mm"
         is_touching = tool.touching
         if not is_touching and grasp.guard == "touch":
@@ -73,6 +88,11 @@ class Approach(Skill):
             raise self.failure("blocked", f"{message}, which {expectation}")
         if not is_touching:
             return
+        if grasp.goal.fast_length and first_touch_height > fast_end_height + EARLY_CONTACT_MARGIN:
+            # The arm has braked below the contact, so `height` is no height of the object.
+            cell.ledger.record_failed_pick(item)
+            message = f"the tool touched something at {first_touch_height * 1000:.0f} mm, still fast; {item}"
+            raise self.failure("no_contact", f"{message} {expectation}; the next approach is slow")
         measurement = cell.tool_model.measure_contact(
             object_class, self.target.position, height, cell.classes, self.overtravel
         )

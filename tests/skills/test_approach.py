@@ -99,3 +99,16 @@ def test_nothing_is_felt_for_below_the_middle_of_a_thin_part(parts: FakeCell) ->
     assert parts.ledger.records[0].empty_probe_count == 0, (
         "a thin part cannot be distinguished from the table"
     )
+
+
+def test_a_contact_while_the_arm_is_still_fast_measures_nothing(fake: FakeCell) -> None:
+    fake.world.put("duck", 0.5, 0.0)
+    thing = fake.world.put("duck", 0.6, 0.1)
+    run_skill(Approach(target=look(fake)[0]), fake)
+    _, target = look(fake)
+    thing.label = "sphere"
+    thing.position[2] = 0.03
+    result = run_skill(Approach(target=target), fake)
+    assert (result.reason, "the next approach is slow" in result.message) == ("no_contact", True)
+    again = replace(target, change_count=fake.ledger.change_count)
+    assert run_skill(Approach(target=again), fake).reason == "contradicted"
