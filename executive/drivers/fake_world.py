@@ -15,7 +15,7 @@ from executive.geometry import Array, Pose
 
 MAX_GRIP_OFFSET = 0.012
 """Maximum horizontal distance between the tool and the contact points of an object for a grip [m]."""
-TOUCH_DISTANCE = 0.002
+TOUCH_DISTANCE = 0.001
 """Maximum vertical distance between the tool and the top of an object for contact [m]."""
 
 

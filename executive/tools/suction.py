@@ -31,9 +31,6 @@ ATTEMPTS_BEFORE_PROBE = 3
 """Number of failed attempts after which each approach is a probe."""
 GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
 """Angle between two successive points of a Vogel spiral [rad]."""
-MAX_TOUCH_HEIGHT_ERROR = 0.003
-"""Maximum difference between the height of a touch and the height of a class [m]; 52 touches of the mission
-`sort_overhead` had errors of at most 0.4 mm."""
 OTHER_CLASS_TOLERANCE = 0.0025
 """Maximum difference between the height of a touch and the height of another class to which the object may
 belong [m]."""
@@ -61,6 +58,8 @@ class Suction(ToolModel):
     """Angle between surface normal and tool axis at which the breakaway force is zero [degree]."""
     min_force: Force
     """Minimum breakaway force at which the vacuum sensor reports a seal [N]."""
+    touch_tolerance: Length = 0.003
+    """Maximum difference between the height of a touch and the height of a class [m]."""
 
     @property
     def parts(self) -> tuple[ToolPart, ...]:
@@ -122,7 +121,7 @@ class Suction(ToolModel):
         """
         errors = {label: _compute_height_error(other, height) for label, other in classes.items()}
         error = errors[object_class.label]
-        if abs(error) <= MAX_TOUCH_HEIGHT_ERROR:
+        if abs(error) <= self.touch_tolerance:
             return ToolMeasurement()
         contradiction = (
             f"it was touched {height * 1000:.0f} mm above the table, and a {object_class.label} is "
@@ -134,9 +133,9 @@ class Suction(ToolModel):
         return ToolMeasurement(contradiction, may_be_wrong, is_miss=not is_near_top)
 
     def find_distinct_labels(self, classes: Mapping[str, ObjectClass]) -> frozenset[str]:
-        """Return the classes whose height differs by more than `MAX_TOUCH_HEIGHT_ERROR` from all others."""
+        """Return the classes whose height differs by more than `touch_tolerance` from all others."""
         heights = np.array([object_class.height for object_class in classes.values()])
-        counts = (np.abs(heights[:, None] - heights) <= MAX_TOUCH_HEIGHT_ERROR).sum(axis=1)
+        counts = (np.abs(heights[:, None] - heights) <= self.touch_tolerance).sum(axis=1)
         return frozenset(label for label, count in zip(classes, counts, strict=True) if count == 1)
 
     def build_sim(self, world: World, noise_seed: int = 0) -> SimTool:

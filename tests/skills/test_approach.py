@@ -43,8 +43,8 @@ def test_a_probe_far_beside_the_middle_proves_nothing(fake: FakeCell) -> None:
 @pytest.mark.parametrize(
     ("is_touched", "reason", "message"),
     [
-        (False, "contradicted", "cube-1 may be no cube: it was touched 22 mm above the table, and a cube is"),
-        (True, "no_contact", "the top of cube-1 was expected at 50 mm; it was touched 22 mm above the table"),
+        (False, "contradicted", "cube-1 may be no cube: it was touched 21 mm above the table, and a cube is"),
+        (True, "no_contact", "the top of cube-1 was expected at 50 mm; it was touched 21 mm above the table"),
     ],
 )
 def test_a_touch_that_only_the_fourth_attempt_can_make_is_no_touch_of_the_target(
@@ -84,7 +84,7 @@ def test_further_attempts_go_round_the_ring(parts: FakeCell) -> None:
         run_skill(Approach(target=target), parts)
         steps.append(parts.arm.tool_pose.position[:2] - target.position[:2])
         parts.ledger.record_failed_pick(target.item)
-    assert np.linalg.norm(steps, axis=1) == pytest.approx([RING] * 5, abs=2e-4)
+    assert np.linalg.norm(steps, axis=1) == pytest.approx([RING] * 5, abs=3e-4)
     angles = sorted(math.atan2(y, x) for x, y in steps)
     gaps = np.diff([*angles, angles[0] + math.tau])
     assert math.radians(30) < gaps.min() <= gaps.max() < math.radians(150)
