@@ -95,6 +95,10 @@ class DeadlinePassed(Unavailable):
         self.timeout = timeout
 
 
+class WrongImage(ExecutiveError):
+    """A camera returned an image of another size or format than declared."""
+
+
 class NoDepth(ExecutiveError):
     """A detection cannot be localized, for instance because the depth image has no values in the box."""
 

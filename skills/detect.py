@@ -16,7 +16,7 @@ class LookingSkill(Skill):
 
     detector: str = param("", refers_to="detector", doc="a detector of the cell; empty: the first detector")
     view: str = param("table", choices=("table", "full"), doc="`table`: the workspace; `full`: entire image")
-    reasons: ClassVar[tuple[str, ...]] = ("unavailable", "crowded", "camera_moved")
+    reasons: ClassVar[tuple[str, ...]] = ("unavailable", "crowded", "camera_moved", "frozen", "wrong_image")
     uses = ("camera",)
     senses = True
 
@@ -31,6 +31,8 @@ class Detect(LookingSkill):
     with `hidden: pass`, detects objects in the visible part; the hidden part then counts as unknown.
     The skill fails with `crowded` if the detector reports more than 60 boxes of any confidence outside of the
     bins, and with `camera_moved` if the bins in the image are away from their expected positions.
+    The skill fails with `wrong_image` if the image has another size or format than declared, with `frozen`
+    if the camera repeats an image: the same pixels, no later stamp, or no change where the arm moved.
     """
 
     detections: Out[Detections] = port(doc="the detections and their frame")

@@ -313,7 +313,17 @@ class Camera(Protocol):
         """Return True if the whole workspace is now in the image and the arm occludes no part of it."""
 
     def capture(self) -> Frame:
-        """Capture and return a new frame."""
+        """Capture and return a new frame.
+
+        Raises:
+            WrongImage: The image has another size or format than declared.
+        """
+
+    def describe_standstill(self, frame: Frame, time: float) -> str:
+        """Return a sentence if a frame shows no newer image than the last new frame, else "".
+
+        `time` is the time of the capture on the clock of the run [s].
+        """
 
     def find_unexplained(self, look: Detections, obstacles: Collection[Obstacle]) -> Sequence[Region]:
         """Return the regions of a frame that neither the table nor anything known explains.

@@ -12,7 +12,7 @@ from executive.cell.arm import Arm, Goal, Motion, MotionGuard, Task
 from executive.cell.frame import Detections, Observation
 from executive.cell.objects import Item, Target
 from executive.cell.protocols import Cell, Steps
-from executive.errors import Blocked, Crowded, NoDepth, Unavailable, Unreachable
+from executive.errors import Blocked, Crowded, NoDepth, Unavailable, Unreachable, WrongImage
 from executive.geometry import GRAVITY, Array
 from executive.manipulation.tool_goals import list_obstacles, make_obstacle
 from executive.skill import Skill, SkillFailed
@@ -32,9 +32,14 @@ def capture_and_detect(cell: Cell, detector: str, view: str) -> Generator[None, 
         view: The searched part of the frame: `table` or `full`.
 
     Raises:
-        SkillFailed: `camera_moved`, `crowded` or `unavailable`.
+        SkillFailed: `wrong_image`, `frozen`, `camera_moved`, `crowded` or `unavailable`.
     """
-    frame = cell.camera.capture()
+    try:
+        frame = cell.camera.capture()
+    except WrongImage as error:
+        raise SkillFailed("wrong_image", str(error)) from error
+    if standstill := cell.camera.describe_standstill(frame, cell.clock.now):
+        raise SkillFailed("frozen", standstill)
     request = cell.detectors[detector or next(iter(cell.detectors))].request(frame, view)
     # The detector searches the frame during this check.
     if displacement := cell.camera.describe_displacement(frame):

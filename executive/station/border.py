@@ -218,6 +218,7 @@ METHODS: Mapping[str, Input] = {
     "tool.open": COMMAND,
     "image.capture": Input("camera.image", IMAGE),
     "camera.sees_table": Input("camera.sees_table"),
+    "camera.describe_standstill": Input("camera.standstill"),
     "camera.describe_displacement": Input("camera.displacement"),
     "camera.find_unexplained": Input("camera.regions", REGIONS),
     "camera.check_bins": Input("camera.bins"),
@@ -357,14 +358,14 @@ class Border:
             return value
         try:
             value = query()
+            # Most values are read in every tick and need no conversion.
+            is_encoded = codec is IDENTITY and not isinstance(value, np.generic)
+            encoded: Any = value if is_encoded else codec.encode(value)
         except Interrupted:
             raise
         except BaseException as error:
             self._emit(InputRead(name, read_count, to_text(error), type(error).__name__))
             raise
-        # Most values are read in every tick and need no conversion.
-        is_encoded = codec is IDENTITY and not isinstance(value, np.generic)
-        encoded: Any = value if is_encoded else codec.encode(value)
         if name not in self._last_values or encoded != self._last_values[name]:
             self._last_values[name] = encoded
             self._emit(InputRead(name, read_count, encoded))

@@ -18,11 +18,11 @@ from executive.cell.devices import ArmDevice, CameraDevice, CameraImage
 from executive.cell.frame import Box, Detections, Frame, Region, TrueFrame
 from executive.cell.objects import Bin, Obstacle
 from executive.cell.protocols import Tool
-from executive.errors import Fault
+from executive.errors import WrongImage
 from executive.geometry import Array, Pose
 from executive.motion.joints import Kinematics
 from executive.perception.bin_check import check_bins
-from executive.perception.camera_check import describe_displacement
+from executive.perception.camera_check import describe_displacement, describe_standstill
 from executive.perception.camera_model import BORDER_FRACTION, compute_calibration, compute_hull_mask
 from executive.perception.witness import find_unexplained
 
@@ -101,6 +101,8 @@ class CellCamera:
         self._table = config.table
         self._min_radius = min(section.radius for section in config.objects.values())
         self._frame_count = 0
+        self._last_new_frame: tuple[Frame, float] | None = None
+        """Last frame that was newer than the frame before, and the time of its capture [s]."""
         self._pose_count = 0
         self._content_mask = np.ones((self.config.height, self.config.width), dtype=bool)
         """Mask `(H, W)` of the pixels that are not in the ignored border of an image with a partial view."""
@@ -132,7 +134,7 @@ class CellCamera:
         height, width = image.colour.shape[:2]
         if (width, height) != self._size:
             sizes = f"{width} x {height} pixels instead of {self._size[0]} x {self._size[1]}"
-            raise Fault(f"the camera {self.name} returned an image of {sizes}, which the cell file declares")
+            raise WrongImage(f"camera {self.name} returned an image of {sizes}, which the cell file declares")
         visible = image.visible
         if visible is None:
             visible = self._compute_visibility_mask(self._robot, X_WC)
@@ -150,6 +152,19 @@ class CellCamera:
         if image.true_detections is None:
             return frame
         return TrueFrame(**vars(frame), true_detections=image.true_detections)
+
+    def describe_standstill(self, frame: Frame, time: float) -> str:
+        """Return a sentence if a frame is not newer than the last new frame, or "" and keep it as this."""
+        last_frame, last_time = self._last_new_frame or (None, 0.0)
+        problem = ""
+        if last_frame is not None and frame.stamp <= last_frame.stamp and time > last_time:
+            stamps = f"the stamp {frame.stamp:.3f} s, and frame {last_frame.id} had {last_frame.stamp:.3f} s"
+            problem = f"the clock of camera {self.name} stands: frame {frame.id} has {stamps}"
+        elif last_frame is not None and self._is_hidden_by_arm and self.config.noise.read:
+            problem = describe_standstill(frame, last_frame)
+        if not problem:
+            self._last_new_frame = (frame, time)
+        return problem
 
     def describe_displacement(self, frame: Frame) -> str:
         """Return a sentence if the bins in a frame are not where the declared pose shows them, else ""."""
@@ -210,10 +225,10 @@ def encode_image(image: CameraImage) -> dict[str, Any]:
     """Return size, time and visible pixels of an image; the journal does not contain the colours.
 
     Raises:
-        Fault: A camera returned something else than a valid image.
+        WrongImage: A camera returned something else than a valid image.
     """
     if problem := _describe_invalid_image(image):
-        raise Fault(f"a camera returned {problem}; `CameraImage` in executive.cell.devices is required")
+        raise WrongImage(f"a camera returned {problem}; `CameraImage` in executive.cell.devices is required")
     visible = None if image.visible is None else _encode_mask(image.visible)
     return {"size": list(image.colour.shape[:2]), "stamp": image.stamp, "visible": visible}
 

@@ -14,7 +14,12 @@ from executive.cell.frame import Frame
 from executive.cell.objects import BIN_THICKNESS, Bin
 from executive.geometry import Array, Pose
 from executive.perception.bin_check import check_bins
-from executive.perception.camera_check import MAX_OUTLINE_DISTANCE, describe_displacement, estimate_offset
+from executive.perception.camera_check import (
+    MAX_OUTLINE_DISTANCE,
+    describe_displacement,
+    describe_standstill,
+    estimate_offset,
+)
 from executive.perception.camera_model import compute_camera_matrix, project
 from tests.camera_poses import looking_down
 
@@ -135,7 +140,8 @@ def test_a_bin_that_is_gone_has_no_other_place() -> None:
 def test_exchanged_bins_have_the_colours_of_each_other() -> None:
     exchanged = [replace(BINS[0], name="blue"), replace(BINS[1], name="red"), BINS[2]]
     found = check_bins(draw(DECLARED, bins=exchanged, light=0.6), DECLARED_BINS)
-    assert "from that of blue" in found["red"] and "from that of red" in found["blue"]
+    assert "has the colour of blue" in found["red"]
+    assert "has the colour of red" in found["blue"]
     assert found["yellow"] == ""
 
 
@@ -144,3 +150,27 @@ def test_the_arm_and_darkness_are_no_evidence_about_bins() -> None:
     frame.visible[:300] = False
     assert "yellow" not in check_bins(frame, DECLARED_BINS)
     assert check_bins(draw(DECLARED, bins=BINS[:2], light=0.15), DECLARED_BINS) == {}
+
+
+@pytest.mark.parametrize(
+    ("seed", "arm_colour", "problem"),
+    [
+        (0, None, "has the same pixels as frame 1"),
+        (1, None, "differs from frame 1 in 0.0% of the region"),
+        (1, (240, 120, 20), ""),
+    ],
+)
+def test_a_camera_is_frozen_if_its_image_does_not_change_where_the_arm_moved(
+    seed: int, arm_colour: tuple[int, int, int] | None, problem: str
+) -> None:
+    first = draw(DECLARED)
+    image = first.image.copy()
+    visible = first.visible.copy()
+    visible[200:320, 200:320] = False
+    if arm_colour:
+        image[220:300, 220:300] = arm_colour
+    noise = seed * np.random.default_rng(seed).normal(0, 2, image.shape)
+    noisy = np.clip(image + noise, 0, 255).astype(np.uint8)
+    second = replace(first, id=2, stamp=0.5, image=noisy, visible=visible)
+    text = describe_standstill(second, first)
+    assert problem in text if problem else text == ""

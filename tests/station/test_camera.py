@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
 import pytest
-from at_hand import look, pick
+from at_hand import intercept, look, pick
 
 from executive.cell.config import CellConfig
 from executive.cell.devices import CameraImage
-from executive.errors import Fault
+from executive.events import Event, InputRead
 from executive.geometry import Pose
 from executive.testing.fake_cell import FakeCell
+from executive.testing.run_skill import run_skill
+from skills.detect import Detect
 
 
 def test_frames_are_numbered_from_1_and_have_time_and_changes_of_the_ledger(fake: FakeCell) -> None:
@@ -55,8 +58,19 @@ IMAGE = CameraImage(np.zeros((480, 640, 3), np.uint8), None, 0.0)
         (IMAGE._replace(stamp=float("nan")), "the stamp nan"),
     ],
 )
-def test_an_image_that_is_not_as_declared_is_a_fault(image: Any, problem: str) -> None:
-    fake = FakeCell()
-    fake.border.interceptor = lambda access: image if access.path == "image.capture" else access.proceed()
-    with pytest.raises(Fault, match=problem):
-        fake.cell.camera.capture()
+def test_an_image_that_is_not_as_declared_is_a_recorded_reason(image: Any, problem: str) -> None:
+    events: list[Event] = []
+    fake = FakeCell(emit=events.append)
+    intercept(fake, "image.capture", lambda: image)
+    result = run_skill(Detect(), fake)
+    assert result.reason == "wrong_image"
+    assert re.search(problem, result.message)
+    reads = [event for event in events if isinstance(event, InputRead) and event.name == "camera.image"]
+    assert image is not None or reads[0].exception == "WrongImage"
+
+
+def test_a_stamp_that_stands_while_time_passes_shows_a_frozen_camera(fake: FakeCell) -> None:
+    intercept(fake, "image.capture", lambda: IMAGE._replace(true_detections=()))
+    assert run_skill(Detect(), fake).status == "SUCCESS"
+    result = run_skill(Detect(), fake)
+    assert (result.reason, "frame 2 has the stamp 0.000 s" in result.message) == ("frozen", True)
