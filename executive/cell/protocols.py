@@ -320,7 +320,7 @@ class Camera(Protocol):
         """
 
     def describe_standstill(self, frame: Frame, time: float) -> str:
-        """Return a sentence if a frame shows no newer image than the last new frame, else "".
+        """Return a sentence if a frame shows no newer image than the last frame, else "".
 
         `time` is the time of the capture on the clock of the run [s].
         """

@@ -18,7 +18,7 @@ from executive.errors import Fault
 from executive.events import BinsEmptied, Emit, ItemChanged
 from executive.geometry import Array
 from executive.ledger.bin_contents import REASON_PROBABLY_FELL, BinContents, find_probable_bin
-from executive.ledger.certainty import FINAL_STATES, Certainty, discard_moved_items
+from executive.ledger.certainty import FINAL_STATES, MIN_LOG_RATIO_OF_WEIGHT, Certainty, discard_moved_items
 from executive.ledger.coverage import Coverage
 from executive.ledger.item import ON_TABLE, ItemRecord, ItemRecords, State
 from executive.ledger.look import AMBIGUITY_FACTOR, LookUpdate, make_look_event
@@ -52,7 +52,7 @@ class Tracker:
         unknown_labels: Other labels that are not in the cell file, each with its maximum number of boxes per
             frame.
         ignored_positions: Positions `(3,)` [m] of all detections with an ignored label so far.
-        empty_load: Load of the empty tool before the last approach [N].
+        empty_load: Last load of the empty tool, before an approach or after a release [N].
         unexplained: All that images or sensors show and no item explains.
         assumption_reasons: Reasons why error rates of detectors were assumed, and not measured.
     """
@@ -83,6 +83,12 @@ class Tracker:
         self._last_stamp = 0.0
         """Capture time of the last look [s]."""
         self.empty_load = 0.0
+        self._last_weighing: tuple[ItemRecord, float, float] | None = None
+        """Item whose class the last weighing determined, its weight and the error of the weight [N]."""
+        self._load_cell_problem = ""
+        """Weight of the last object whose class the looks prove, if the weight contradicts the class."""
+        self._is_load_cell_checked = False
+        """True if an object was weighed whose class the looks prove."""
         self.unexplained = Unexplained(self.emit)
         self.assumption_reasons: list[str] = []
 
@@ -152,7 +158,15 @@ class Tracker:
         return Presence.GONE
 
     def record_empty_load(self, load: float) -> None:
+        shift = load - self.empty_load
         self.empty_load = load
+        if self._last_weighing is not None:
+            record, weight, std = self._last_weighing
+            self._last_weighing = None
+            log_ratios = evidence.compute_weight_log_ratios(weight - shift, std, self.classes)
+            if log_ratios[record.label] < MIN_LOG_RATIO_OF_WEIGHT:
+                text = f"the load cell's zero moved by {shift:+.2f} N; {record.item} may be no {record.label}"
+                self.unexplained.report(f"weight of {record.item}", text)
 
     def record_measurement(self, item: Item, measurement: ToolMeasurement) -> bool:
         record = self._records.find(item)
@@ -167,11 +181,22 @@ class Tracker:
     def record_weight(self, item: Item, weight: float, std: float) -> str:
         record = self._records.find(item)
         label_map = {label: other.detected_label for label, other in self.classes.items()}
+        is_proved = self._is_class_proved_by_looks(record)
         record.belief.add_weighing(evidence.compute_weight_log_ratios(weight, std, self.classes), label_map)
-        contradiction = ""
+        contradiction = "" if is_proved else self._load_cell_problem
         if not self._certainty.is_class_certain_by_weight(record):
             contradiction = evidence.describe_weight(weight, record.label, self.classes)
+        if is_proved:
+            self._is_load_cell_checked = True
+            self._load_cell_problem = contradiction and f"the load cell may be wrong: {item}: {contradiction}"
+            self.unexplained.withdraw("load cell")
+        if is_proved and contradiction:
+            text = f"{self._load_cell_problem}; other weighed objects may be of another class"
+            self.unexplained.report("load cell", text)
+        if contradiction:
             record.last_contradiction = contradiction
+        else:
+            self._last_weighing = (record, weight, std)
         self._records.emit(record)
         return contradiction
 
@@ -258,6 +283,9 @@ class Tracker:
                 self.unexplained.withdraw(f"bin {name}")
 
     def set_final_states(self, *, completed: bool) -> None:
+        was_weighed = any(record.belief.weight_log_ratios for record in self._records.all)
+        if was_weighed and not self._is_load_cell_checked:
+            self.assumption_reasons.append("the load cell has the right gain: no known object proved it")
         has_confirmed_item = any(self._confirmed_labels)
         dropped = self._records.filter_by_state(State.DROPPED)
         dropped_items = [record for record in dropped if not record.was_taken_away]
@@ -476,6 +504,12 @@ class Tracker:
         if record.label not in self.unknown_labels:
             return not record.belief.look_count
         return record.belief.look_count < MIN_LOOKS_WITHOUT_CLASS or record.belief.miss_probability < 1.0
+
+    def _is_class_proved_by_looks(self, record: ItemRecord) -> bool:
+        """Return True if an item's class is certain without its weight, which the cell declares."""
+        alike = [each for each in self.classes.values() if each.detected_label == record.detected_label]
+        has_known_mass = len(alike) == 1 and math.isfinite(alike[0].mass_std)
+        return has_known_mass and self._certainty.is_class_certain(record)
 
     def _explain_skipped_item(self, record: ItemRecord) -> str:
         """Return the reason why the mission sorts none of the possible classes of an item, or ""."""

@@ -38,10 +38,10 @@ def capture_and_detect(cell: Cell, detector: str, view: str) -> Generator[None, 
         frame = cell.camera.capture()
     except WrongImage as error:
         raise SkillFailed("wrong_image", str(error)) from error
+    request = cell.detectors[detector or next(iter(cell.detectors))].request(frame, view)
+    # The detector searches the frame during these checks.
     if standstill := cell.camera.describe_standstill(frame, cell.clock.now):
         raise SkillFailed("frozen", standstill)
-    request = cell.detectors[detector or next(iter(cell.detectors))].request(frame, view)
-    # The detector searches the frame during this check.
     if displacement := cell.camera.describe_displacement(frame):
         raise SkillFailed("camera_moved", displacement)
     # Both checks together exceed a control period.
@@ -220,6 +220,8 @@ def release(
             record_release()
     if is_stuck:
         raise skill.failure("stuck", f"{item} hangs on the tool {settle:.2f} s after release")
+    # The ledger compares the zero with that before the approach.
+    cell.ledger.record_empty_load(cell.tool.load)
 
 
 def make_task(cell: Cell) -> Task:

@@ -167,7 +167,6 @@ def _describe_footprint_contradiction(
     The outline is the part of the rectangle within the radius of the class. Each side of the box is at least
     that of the image of the outline at half the height, and at most that of a prism over the outline.
     """
-    assert object_class.footprint is not None
     half_length, half_width = np.array(object_class.footprint) / 2
     angles = np.linspace(0, math.pi, 16, endpoint=False)
     x = np.clip(object_class.radius * np.cos(angles), -half_length, half_length)

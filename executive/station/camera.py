@@ -101,8 +101,8 @@ class CellCamera:
         self._table = config.table
         self._min_radius = min(section.radius for section in config.objects.values())
         self._frame_count = 0
-        self._last_new_frame: tuple[Frame, float] | None = None
-        """Last frame that was newer than the frame before, and the time of its capture [s]."""
+        self._last_capture: tuple[Frame, float] | None = None
+        """Last frame that was compared with the frame before, and the time of its capture [s]."""
         self._pose_count = 0
         self._content_mask = np.ones((self.config.height, self.config.width), dtype=bool)
         """Mask `(H, W)` of the pixels that are not in the ignored border of an image with a partial view."""
@@ -154,17 +154,14 @@ class CellCamera:
         return TrueFrame(**vars(frame), true_detections=image.true_detections)
 
     def describe_standstill(self, frame: Frame, time: float) -> str:
-        """Return a sentence if a frame is not newer than the last new frame, or "" and keep it as this."""
-        last_frame, last_time = self._last_new_frame or (None, 0.0)
-        problem = ""
-        if last_frame is not None and frame.stamp <= last_frame.stamp and time > last_time:
+        """Return a sentence if a frame is not newer than the last frame, else ""."""
+        last_frame, last_time = self._last_capture or (frame, time)
+        self._last_capture = (frame, time)
+        if time > last_time and frame.stamp <= last_frame.stamp:
             stamps = f"the stamp {frame.stamp:.3f} s, and frame {last_frame.id} had {last_frame.stamp:.3f} s"
-            problem = f"the clock of camera {self.name} stands: frame {frame.id} has {stamps}"
-        elif last_frame is not None and self._is_hidden_by_arm and self.config.noise.read:
-            problem = describe_standstill(frame, last_frame)
-        if not problem:
-            self._last_new_frame = (frame, time)
-        return problem
+            return f"the clock of camera {self.name} stands: frame {frame.id} has {stamps}"
+        has_pixels = self._is_hidden_by_arm and self.config.noise.read and frame is not last_frame
+        return describe_standstill(frame, last_frame) if has_pixels else ""
 
     def describe_displacement(self, frame: Frame) -> str:
         """Return a sentence if the bins in a frame are not where the declared pose shows them, else ""."""

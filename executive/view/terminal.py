@@ -306,7 +306,7 @@ def format_summary(
     if labels_text := describe_unknown_labels(result.unknown_labels):
         outcomes.append(f"  {labels_text}")
     outcomes += [f"  {entry.name}: {entry.text}" for entry in result.unexplained]
-    outcomes += [f"  detector error rates are assumed: {reason}" for reason in result.assumption_reasons]
+    outcomes += [f"  assumption: {reason}" for reason in result.assumption_reasons]
     warning = wrap_lines(result.disagreement, "", "  ", max_lines=3)
     if result.diagnosis is not None:
         diagnosis = format_diagnosis(result.diagnosis, result.run, repeat_command, report_file)

@@ -12,6 +12,7 @@ from executive.geometry import GRAVITY
 from executive.skill import SkillFailed
 from executive.testing.fake_cell import FakeCell, load_empty_cell
 from executive.testing.run_skill import SkillResult, run_skill
+from skills.release import Release
 from skills.select_target import SelectTarget
 from skills.transit import Transit
 from skills.weigh import Weigh
@@ -155,3 +156,42 @@ def test_the_bin_of_one_of_two_classes_that_look_alike_is_blocked_until_the_weig
 def test_an_item_that_was_not_weighed_gets_into_a_bin_of_all_classes_or_of_none(bin: str) -> None:
     fake = make_fake({"bottle": ("red_bin",), "full_bottle": ("red_bin", "blue_bin")})
     assert run_skill(Transit(held=pick(fake, "bottle"), bin=bin), fake).status == "SUCCESS"
+
+
+def finish(fake: FakeCell, label: str, load_error: float = 0.0) -> str:
+    """Weigh an object of a class and release it in its bin; return the reason of a failed weighing."""
+    item = pick(fake, label)
+    result = weigh(fake, item)
+    fake.tool.load_error = load_error
+    if result.status == "SUCCESS":
+        run_skill(Transit(held=item, bin=result.outputs["bin"]), fake)
+        run_skill(Release(held=item, bin=result.outputs["bin"]), fake)
+    else:
+        fake.tool.open()
+        fake.ledger.record_drop(item)
+    fake.world.objects.clear()
+    return result.reason
+
+
+def list_unexplained(fake: FakeCell) -> list[str]:
+    return [event.text for event in fake.ledger.unexplained.events]
+
+
+@pytest.mark.parametrize(("shift", "count"), [(0.1, 0), (0.15 * GRAVITY, 1)])
+def test_a_zero_that_moved_during_a_weighing_makes_its_class_uncertain(shift: float, count: int) -> None:
+    fake = make_fake()
+    finish(fake, "bottle", load_error=shift)
+    assert len(list_unexplained(fake)) == count
+
+
+def test_a_wrong_gain_is_noticed_by_an_object_whose_class_the_looks_prove(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    fake = make_fake()
+    read_load = FakeTool.load.fget
+    assert read_load is not None
+    monkeypatch.setattr(FakeTool, "load", property(lambda tool: 4.0 * read_load(tool)))
+    assert finish(fake, "bottle") == ""  # taken for a full bottle
+    assert finish(fake, "jar") == "contradicted"
+    assert "the load cell may be wrong: jar-1" in list_unexplained(fake)[0]
+    assert finish(fake, "bottle") == "contradicted"
