@@ -72,7 +72,7 @@ class ContactMonitor:
             for point in world.client.getContactPoints(bodyA=body) or ():
                 if point[BODY_B] not in robot:
                     is_arm = body == world.arm
-                    part = world.name_link(point[LINK_A]) if is_arm else name_load(world.labels[body])
+                    part = world.name_link(point[LINK_A]) if is_arm else name_load("object")
                     yield part, point[BODY_B], point[POSITION_A], point[NORMAL_FORCE]
 
 

@@ -130,10 +130,10 @@ class World(CellWorld):
         return TrueObject(self.labels[body], self.get_object_pose(body), body, model=self.models[body])
 
     def name_body(self, body: int) -> str:
-        """Return the name of a body for messages."""
+        """Return the name of a body for messages; a robot does not know what objects are."""
         names = {self.table: "the table", self.floor: "the floor", self.arm: "the arm"}
         names |= {bin_body: name for name, bin_body in self.bin_bodies.items()}
-        return f"a {self.labels[body]}" if body in self.labels else names.get(body, "something unknown")
+        return names.get(body, "something")
 
     def get_object_pose(self, body: int) -> Pose:
         """Return the pose `X_WO` of the upright frame O of a loose object."""
