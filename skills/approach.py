@@ -9,11 +9,13 @@ from executive.cell.objects import Target
 from executive.cell.protocols import Cell, Steps
 from executive.cell.tools import CONTACT_SPACING, OVERTRAVEL
 from executive.manipulation.motions import follow, plan
-from executive.manipulation.tool_goals import choose_grasp
+from executive.manipulation.tool_goals import choose_grasp, find_max_object_height
 from executive.skill import EMPTY, In, Metres, Skill, param, port
 
 EARLY_CONTACT_MARGIN = 0.001
 """Height above the start of the guarded descent from which a contact counts as a collision [m]."""
+MAX_CONTACT_LAYERS = 4
+"""Maximum height of a contact before an approach, as a multiple of the height of the tallest class."""
 
 
 class Approach(Skill):
@@ -30,13 +32,14 @@ class Approach(Skill):
     `contradicted`. The first measurement that may be wrong is no contradiction if the detections alone prove
     the class. A contact at which the tool cannot grip the object, for instance below its centre or more than
     `overtravel` below its top, is a miss; the skill then fails with `no_contact`. It also does at a contact
-    during the fast motion, whose height cannot be measured; the next approach is slow.
+    during the fast motion, whose height cannot be measured; the next approach is slow. It fails with
+    `implausible` if the contact sensor feels nothing in all approaches, or something high above the table.
     """
 
     target: In[Target] = port(doc="the target to touch")
     overtravel: Metres = param(OVERTRAVEL, ge=0, le=0.03, doc="depth of the descent below the surface")
     offset: Metres = param(CONTACT_SPACING, ge=0, le=0.02, doc="spacing of the contact points of attempts")
-    reasons = ("stale", "unreachable", "blocked", "contradicted", "no_contact")
+    reasons = ("stale", "unreachable", "blocked", "contradicted", "no_contact", "implausible")
     uses = ("arm", "tool")
     moves = True
     tool_state = (EMPTY, EMPTY)
@@ -56,6 +59,9 @@ class Approach(Skill):
 
         motion = yield from plan(self, cell.arm, find_goal_and_task)
         grasp, _ = find_grasp()
+        max_contact_height = MAX_CONTACT_LAYERS * find_max_object_height(cell)
+        if tool.touching and cell.arm.tool_pose.position[2] > max_contact_height:
+            raise self.failure("implausible", "the contact sensor feels something high above the table")
         # The zero of a load cell drifts; only before the descent, the tool is at rest and certainly empty.
         cell.ledger.record_empty_load(tool.load)
         first_touch_height = 0.0
@@ -75,12 +81,14 @@ class Approach(Skill):
         object_class = cell.classes[self.target.label]
         height = float(cell.arm.tool_pose.position[2])
         start_height = grasp.goal.position[2] + grasp.goal.guarded_length
-        fast_end_height = start_height - grasp.goal.fast_length
+        slow_height = start_height - grasp.goal.fast_length + EARLY_CONTACT_MARGIN
         expectation = f"was expected at {grasp.contact_height * 1000:.0f} mm"
         is_touching = tool.touching
         if not is_touching and grasp.guard == "touch":
             cell.ledger.record_failed_pick(item, found_table=grasp.proves_absence)
             message = f"no contact down to {height * 1000:.0f} mm, {item} {expectation}"
+            if not cell.ledger.is_contact_sensor_plausible():
+                raise self.failure("implausible", f"{message}; the contact sensor has never felt one")
             raise self.failure("no_contact", message)
         if is_touching and (grasp.guard == "clear" or height > start_height + EARLY_CONTACT_MARGIN):
             cell.ledger.invalidate_positions()
@@ -88,7 +96,7 @@ class Approach(Skill):
             raise self.failure("blocked", f"{message}, which {expectation}")
         if not is_touching:
             return
-        if grasp.goal.fast_length and first_touch_height > fast_end_height + EARLY_CONTACT_MARGIN:
+        if grasp.goal.fast_length and first_touch_height > slow_height:
             # The arm has braked below the contact, so `height` is no height of the object.
             cell.ledger.record_failed_pick(item)
             message = f"the tool touched something at {first_touch_height * 1000:.0f} mm, still fast; {item}"

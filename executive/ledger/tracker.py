@@ -31,6 +31,8 @@ the attempts of the library, so that an obstacle that is no longer there costs n
 MAX_BODY_WIDTH = 0.5
 """Maximum width of the box of an ignored object, as a fraction of the searched region's width; a wider box
 shows the table or a tray, on which the objects lie."""
+MIN_FAILED_PICKS_WITHOUT_CONTACT = 8
+"""Number of failed picks, more than the attempts for one item, after which the tool must have felt one."""
 MIN_LOOKS_WITHOUT_CLASS = 3
 """Minimum number of looks that show an item of no class before the table counts as searched."""
 
@@ -157,6 +159,10 @@ class Tracker:
         self._records.emit(record)
         return Presence.GONE
 
+    def is_contact_sensor_plausible(self) -> bool:
+        has_few_failures = len(self._records.failed_picks) < MIN_FAILED_PICKS_WITHOUT_CONTACT
+        return has_few_failures or any(record.had_contact for record in self._records.all)
+
     def record_empty_load(self, load: float) -> None:
         shift = load - self.empty_load
         self.empty_load = load
@@ -190,9 +196,8 @@ class Tracker:
             self._is_load_cell_checked = True
             self._load_cell_problem = contradiction and f"the load cell may be wrong: {item}: {contradiction}"
             self.unexplained.withdraw("load cell")
-        if is_proved and contradiction:
-            text = f"{self._load_cell_problem}; other weighed objects may be of another class"
-            self.unexplained.report("load cell", text)
+        if self._load_cell_problem:
+            self.unexplained.report("load cell", f"{self._load_cell_problem}; others may be wrong, too")
         if contradiction:
             record.last_contradiction = contradiction
         else:

@@ -71,7 +71,8 @@ def make_obstacle(cell: Cell, target: Target) -> Obstacle:
     classes = [object_class] if object_class else cell.classes.values()
     radius = max(each.radius for each in classes)
     height = max(each.height for each in classes)
-    return Obstacle(x, y, radius, z + height / 2, target.item)
+    # A wrong depth image shows objects below the table, on which they cannot lie.
+    return Obstacle(x, y, radius, max(z + height / 2, height), target.item)
 
 
 def find_max_object_height(cell: Cell) -> float:

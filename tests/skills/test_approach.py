@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from at_hand import look
 
+from executive.drivers.fake import FakeTool
 from executive.testing.fake_cell import FakeCell, load_empty_cell
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach
@@ -112,3 +113,16 @@ def test_a_contact_while_the_arm_is_still_fast_measures_nothing(fake: FakeCell) 
     assert (result.reason, "the next approach is slow" in result.message) == ("no_contact", True)
     again = replace(target, change_count=fake.ledger.change_count)
     assert run_skill(Approach(target=again), fake).reason == "contradicted"
+
+
+def test_a_contact_sensor_that_feels_nothing_or_always_something_is_implausible(
+    fake: FakeCell, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fake.world.put("cube", 0.5, 0.0)
+    (target,) = look(fake)
+    for is_touching, failed_pick_count in ((True, 0), (False, 7)):
+        monkeypatch.setattr(FakeTool, "touching", property(lambda tool, value=is_touching: value))
+        for _ in range(failed_pick_count):
+            fake.ledger.record_failed_pick(target.item)
+        current = replace(target, change_count=fake.ledger.change_count)
+        assert run_skill(Approach(target=current), fake).reason == "implausible"
