@@ -173,25 +173,18 @@ def finish(fake: FakeCell, label: str, load_error: float = 0.0) -> str:
     return result.reason
 
 
-def list_unexplained(fake: FakeCell) -> list[str]:
-    return [event.text for event in fake.ledger.unexplained.events]
-
-
 @pytest.mark.parametrize(("shift", "count"), [(0.1, 0), (0.15 * GRAVITY, 1)])
 def test_a_zero_that_moved_during_a_weighing_makes_its_class_uncertain(shift: float, count: int) -> None:
     fake = make_fake()
     finish(fake, "bottle", load_error=shift)
-    assert len(list_unexplained(fake)) == count
+    assert len(fake.ledger.unexplained.events) == count
 
 
-def test_a_wrong_gain_is_noticed_by_an_object_whose_class_the_looks_prove(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_wrong_gain_is_noticed_by_a_class_that_looks_prove(monkeypatch: pytest.MonkeyPatch) -> None:
     fake = make_fake()
-    read_load = FakeTool.load.fget
-    assert read_load is not None
+    read_load = vars(FakeTool)["load"].fget
     monkeypatch.setattr(FakeTool, "load", property(lambda tool: 4.0 * read_load(tool)))
     assert finish(fake, "bottle") == ""  # taken for a full bottle
     assert finish(fake, "jar") == "contradicted"
-    assert "the load cell may be wrong: jar-1" in list_unexplained(fake)[0]
+    assert "the load cell may be wrong: jar-1" in fake.ledger.unexplained.events[0].text
     assert finish(fake, "bottle") == "contradicted"
