@@ -31,7 +31,7 @@ def test_a_touched_object_stays_unexplained_and_is_not_probed_again(region_cell:
     assert run_skill(Probe(), region_cell).status == "SUCCESS"
     show_region(region_cell)
     (event,) = region_cell.ledger.unexplained.events
-    assert "the tool touched it at 52 mm" in event.text, "the fake tool feels a surface 2 mm away"
+    assert "the tool touched it at 51 mm" in event.text, "the fake tool feels a surface 1 mm away"
     assert run_skill(Probe(), region_cell).commands == []
 
 
