@@ -6,23 +6,35 @@ from executive.cell.objects import Item, Target
 from executive.cell.protocols import Cell, Steps
 from executive.skill import EMPTY, HOLDING, In, Out, Seconds, Skill, param, port
 
+MAX_FALSE_GRASPS = 3
+"""Number of contradicted grasps in a row after which the sensor of the tool is no longer believed."""
+
 
 class Grasp(Skill):
     """Close the tool on the target and verify the grasp.
 
-    The skill succeeds if the tool's sensor reports an object after the settling time `settle`.
+    The skill succeeds if the tool's sensor reports an object after the settling time `settle`. The skill
+    fails with `sensor_implausible` if the sensor reports an object while the tool is still open, or if load
+    or looks contradicted the sensor after each of the last grasps.
     """
 
     target: In[Target] = port(doc="the target that the tool touches")
     held: Out[Item] = port(refers_to="item", doc="the item in the tool")
     settle: Seconds = param(0.10, ge=0, le=2, doc="time to wait before reading the sensor")
-    reasons = ("missed",)
+    reasons = ("missed", "sensor_implausible")
     uses = ("tool",)
     tool_state = (EMPTY, HOLDING)
     waits = "settle"
 
     def run(self, cell: Cell) -> Steps:
-        """Close the tool, wait, and read its sensor."""
+        """Check the sensor of the tool, close the tool, wait, and read its sensor."""
+        noun = cell.tool_model.noun
+        if cell.tool.holding:
+            message = f"the sensor reports a {noun} while the tool is open; repair the sensor of the tool"
+            raise self.failure("sensor_implausible", message)
+        if (count := cell.ledger.false_grasp_count) >= MAX_FALSE_GRASPS:
+            message = f"load or looks contradicted the sensor of the {noun} {count} times in a row"
+            raise self.failure("sensor_implausible", f"{message}; check this sensor and the load cell")
         cell.tool.close()
         is_holding = False
         try:
@@ -34,7 +46,6 @@ class Grasp(Skill):
                 cell.tool.open()
         if not is_holding:
             cell.ledger.record_failed_pick(self.target.item)
-            noun = cell.tool_model.noun
             message = f"no {noun} on {self.target.item} {self.settle:.2f} s after contact"
             raise self.failure("missed", message)
         cell.ledger.record_grasp(self.target.item)

@@ -212,6 +212,16 @@ class Ledger(Protocol):
             Fault: According to the ledger, the tool still holds another item.
         """
 
+    @property
+    def false_grasp_count(self) -> int:
+        """Number of grasps that load or looks contradicted since a load confirmed a grasp."""
+
+    def record_held_load(self) -> None:
+        """Record that the load of the tool confirmed the last grasp."""
+
+    def record_false_grasp(self, item: Item) -> None:
+        """Record that the tool held nothing, or something else than the item, since its grasp."""
+
     def record_drop(self, item: Item, landing: Array | None = None) -> None:
         """Record that the tool lost an item, which may have moved any object on the table.
 
@@ -453,6 +463,7 @@ class Cell:
         report_selection: Function that reports a selected target and the name of its bin to the run.
         empty_bins: Function that declares that the bins with the given names have been emptied.
         quotas: Maximum numbers of objects in the bins, from the mission.
+        get_weight: Function that returns the mean weight of the objects of a class [N]; 0 if it is unknown.
         behaviours: Behaviours of other projects.
     """
 
@@ -473,4 +484,5 @@ class Cell:
     report_selection: Callable[[Target, str], None]
     empty_bins: Callable[[Sequence[str]], None]
     quotas: Quotas
+    get_weight: Callable[[str], float]
     behaviours: Behaviours = field(default_factory=Behaviours)

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from executive.cell.arm import Goal, Motion, MotionGuard
-from executive.cell.config import CellConfig
+from executive.cell.config import CellConfig, ObjectConfig
 from executive.cell.device_config import STEP
 from executive.cell.devices import DEFAULT_ROLE, CameraImage, DriverOptions, StepClock, TrueObject, WallClock
 from executive.cell.frame import Box, Detection
@@ -248,6 +248,11 @@ class FakeDriver:
     """
 
     is_rehearsal = True
+
+    @staticmethod
+    def compute_mass(section: ObjectConfig) -> float:
+        """Return the mass of an object [kg]; without a declared mass, the default mass."""
+        return section.build_class("").mass
 
     def __init__(
         self,

@@ -55,6 +55,7 @@ class Tracker:
             frame.
         ignored_positions: Positions `(3,)` [m] of all detections with an ignored label so far.
         empty_load: Last load of the empty tool, before an approach or after a release [N].
+        false_grasp_count: Number of contradicted grasps since a load confirmed a grasp.
         unexplained: All that images or sensors show and no item explains.
         assumption_reasons: Reasons why error rates of detectors were assumed, and not measured.
     """
@@ -91,6 +92,7 @@ class Tracker:
         """Weight of the last object whose class the looks prove, if the weight contradicts the class."""
         self._is_load_cell_checked = False
         """True if an object was weighed whose class the looks prove."""
+        self.false_grasp_count = 0
         self.unexplained = Unexplained(self.emit)
         self.assumption_reasons: list[str] = []
 
@@ -232,6 +234,18 @@ class Tracker:
         self._records.count_failed_pick(record)
         record.drop_count += 1
         record.change_count = self.change_count
+        self.invalidate_positions()
+
+    def record_held_load(self) -> None:
+        self.false_grasp_count = 0
+
+    def record_false_grasp(self, item: Item) -> None:
+        record = self._records.find(item)
+        self._records.change_state(record, State.DROPPED)
+        self._bin_contents.set_prior_log_odds(record, None)
+        self._records.count_failed_pick(record)
+        # `record.change_count` stays that before the grasp: looks after the grasp may show the item.
+        self.false_grasp_count += 1
         self.invalidate_positions()
 
     def record_placement(self, item: Item, bin: str) -> None:

@@ -19,6 +19,13 @@ from executive.skill import Skill, SkillFailed
 
 T = TypeVar("T")
 """Type of the result of a loop."""
+MIN_LOAD_DEVIATIONS = 5.0
+"""Minimum distance of the load of an item, and of no item, from half of the weight of the item, in standard
+deviations; the load is no evidence about lighter items."""
+MAX_ARRIVAL_ERROR = 0.02
+"""Maximum distance between the tool and the goal of a transport that was not interrupted [m]."""
+LOAD_CHECK_TIME = 0.1
+"""Time between two readings of the load, and between closing the tool and reading its sensor [s]."""
 MAX_PLANNING_ATTEMPTS = 3
 """Maximum number of planning attempts for one motion; an update of the ledger may change goal or task."""
 
@@ -203,6 +210,8 @@ def release(
 ) -> Steps:
     """Open the tool, and yield for `settle` [s] until the item lies still.
 
+    The load of the tool shows an item that still hangs on the tool, too.
+
     `record_release` records the new position of the item in the ledger, even if the skill is halted
     during the wait, provided that the tool is empty. `falls` is True if the item falls away from the tool,
     so that a tool that still touches something shows an item that sticks to it.
@@ -214,7 +223,7 @@ def release(
     is_stuck = False
     try:
         yield from cell.clock.sleep(settle)
-        is_stuck = cell.tool.holding or (falls and cell.tool.touching)
+        is_stuck = cell.tool.holding or (falls and (cell.tool.touching or is_loaded(cell, item) is True))
     finally:
         if not (is_stuck or cell.tool.holding):
             record_release()
@@ -222,6 +231,60 @@ def release(
         raise skill.failure("stuck", f"{item} hangs on the tool {settle:.2f} s after release")
     # The ledger compares the zero with that before the approach.
     cell.ledger.record_empty_load(cell.tool.load)
+
+
+def is_loaded(cell: Cell, item: Item) -> bool | None:
+    """Return True if the load of the tool at rest is at least half of the weight of `item`.
+
+    None: the load is no evidence, because the item is too light for the noise of one reading, or because the
+    load cell is broken: the reading is exactly the load of the empty tool, or no finite number.
+    """
+    weight = cell.get_weight(cell.ledger.get_label(item))
+    # Both the load and the load of the empty tool contain the noise of one reading.
+    if weight / 2 < MIN_LOAD_DEVIATIONS * math.sqrt(2) * cell.tool.load_std:
+        return None
+    load = cell.tool.load
+    is_constant = load == cell.ledger.empty_load and cell.tool.load == load
+    if is_constant or not math.isfinite(load):
+        return None
+    return load - cell.ledger.empty_load >= weight / 2
+
+
+def verify_grasp(skill: Skill, cell: Cell, item: Item, goal: Goal) -> Steps:
+    """Compare the sensor of the grip with the load of the tool at rest, and update the ledger.
+
+    A transport that ended before its goal, at which the sensor reports an object, lost the item on the way.
+
+    One reading suffices if it agrees. Otherwise, `LOAD_CHECK_TIME` later, the second reading decides.
+
+    Raises:
+        SkillFailed: The tool holds nothing, or something much lighter than `item`; the tool is then open.
+            The reason is `dropped`, or `sensor_implausible` if the sensor reports an object in free air.
+    """
+    has_arrived = math.dist(cell.arm.tool_pose.position, goal.position) <= MAX_ARRIVAL_ERROR
+    if has_arrived and is_loaded(cell, item) is False:
+        yield from cell.clock.sleep(LOAD_CHECK_TIME)
+        fail_if_dropped(skill, cell, item, "at the end of the transit")
+    is_held = is_loaded(cell, item)
+    if has_arrived and is_held is not False:
+        if is_held:
+            cell.ledger.record_held_load()
+        return
+    noun = cell.tool_model.noun
+    cell.tool.open()
+    cell.ledger.record_false_grasp(item)
+    try:
+        cell.tool.close()
+        yield from cell.clock.sleep(LOAD_CHECK_TIME)
+        is_implausible = cell.tool.holding and not cell.tool.touching
+    finally:
+        cell.tool.open()
+    if is_implausible:
+        message = f"the sensor reports a {noun} in free air; repair the sensor of the tool"
+        raise skill.failure("sensor_implausible", message)
+    raise skill.failure(
+        "dropped", f"the sensor reports a {noun} on {item}, but load or motion show no {item}"
+    )
 
 
 def make_task(cell: Cell) -> Task:

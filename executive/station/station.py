@@ -34,7 +34,7 @@ from executive.cell.objects import UNKNOWN_LABEL, Bin, Quotas
 from executive.cell.protocols import Behaviours, Cell, Operator, Routes
 from executive.errors import InputError
 from executive.events import Emit, TargetSelected
-from executive.geometry import Array
+from executive.geometry import GRAVITY, Array
 from executive.ledger.item import ItemRecord, State
 from executive.ledger.tracker import Tracker
 from executive.motion.joints import Kinematics, build_planning_kinematics
@@ -156,6 +156,9 @@ class Station:
             planner: Any = None
             detectors: Mapping[str, Any] = dict.fromkeys(config.detectors)
             cast_ray = None
+            weights = {
+                label: each.mass * GRAVITY for label, each in classes.items() if math.isfinite(each.mass_std)
+            }
             is_without_physics = kind is not None and is_rehearsal(kind)
             if options.has_devices:
                 kind = kind or load_driver_kind(config.kind)
@@ -163,6 +166,7 @@ class Station:
                 if (compute_mass := getattr(kind, "compute_mass", None)) is not None:
                     masses = {label: compute_mass(section) for label, section in config.objects.items()}
                     classes = {label: replace(each, mass=masses[label]) for label, each in classes.items()}
+                    weights = {label: mass * GRAVITY for label, mass in masses.items()}
                 driver_options = DriverOptions(seed, options.cell_folder, options.driver_options)
                 self.driver = kind(config, driver_options)
                 resources.callback(self.driver.close)
@@ -229,6 +233,8 @@ class Station:
                 ),
                 empty_bins=self.empty_bins,
                 quotas=options.quotas,
+                # A replay has no driver, which may know the masses of objects.
+                get_weight=lambda label: self.border.read(f"weight.{label}", lambda: weights.get(label, 0.0)),
                 behaviours=self.border.wrap("behaviours", Behaviours()),
             )
             self.unrecorded_cell = replace(
