@@ -24,6 +24,10 @@ MAX_LOG_ODDS_OF_AMBIGUOUS_ITEM = math.log(0.1)
 CONFIRMATION_LOG_ODDS = math.log(1e4)
 """Minimum log odds of existence of a confirmed item (`Belief.is_confirmed`); two detections of the same class
 may reach the minimum."""
+PRIOR_REMOVAL_PROBABILITY = 0.0015
+"""Prior probability that a person takes an item away in a run. The first detection of a good detector leaves
+odds of existence of 200, and each repeated detection multiplies them by 1.7: an item that four looks showed
+was probably there; after one to three looks, it may be a false detection."""
 MIN_LOG_ODDS = -700.0
 """Log odds below which a probability counts as the probability at this limit; `math.exp` overflows at 710."""
 
@@ -151,6 +155,20 @@ class Belief:
     def is_probable(self) -> bool:
         """True if the item exists with a probability of at least 0.5."""
         return self.existence_probability >= 0.5
+
+    @property
+    def removal_probability(self) -> float:
+        """Probability that an item was there and left, 0 to 1; otherwise, it never existed.
+
+        Looks since the last detection miss an item that left, and one that never existed, with probability 1.
+        With the odds o of existence at the last detection and the prior probability r of a removal, the
+        hypotheses "exists", "left" and "never existed" have the posteriors o * (1 - r) * m, o * r and 1, up
+        to a common factor; m is `miss_probability`.
+        """
+        if self.is_confirmed:
+            return 1.0
+        log_odds_at_last_detection = self.log_odds - math.log(self.miss_probability)
+        return compute_probability(log_odds_at_last_detection + math.log(PRIOR_REMOVAL_PROBABILITY))
 
     @property
     def probability_at_last_detection(self) -> float:

@@ -158,11 +158,12 @@ class Certainty:
 
         1. An item in the tool is rejected.
         2. An item is rejected if all its detections are doubtful and all later images of its place show it.
-        3. An item whose probability of existence is below 0.5 is a phantom.
+        3. An item whose probability of existence is below 0.5 is a phantom, unless it probably was there and
+           left (`Belief.removal_probability`).
         4. An item that the tool never touched in at least `MIN_EMPTY_PROBES` descents to the table is a
            phantom, if a measurement of the tool has confirmed the class of another item.
         5. A dropped item that the tool may have moved while the journal was incomplete is rejected.
-        6. An item is lost if it was dropped, or if its position on the table is now empty.
+        6. An item is lost if it was dropped, or if it left its position on the table.
         7. An item that is already rejected stays rejected.
         8. An item whose class has no route, or no bin below its quota, is skipped; it is rejected if images
            contradict a bin of its class.
@@ -183,12 +184,12 @@ class Certainty:
             return None
         if record.state is State.SEEN and not belief.look_count and belief.miss_probability == 1.0:
             return State.REJECTED, REASON_UNCERTAIN
-        if not belief.is_probable:
+        if not belief.is_probable and belief.removal_probability < 0.5:
             return State.PHANTOM, REASON_NOT_FOUND
         if record.empty_probe_count >= MIN_EMPTY_PROBES and has_confirmed_item and not record.had_contact:
             count = record.empty_probe_count
             return State.PHANTOM, f"the tool found only the table at its position, {count} times"
-        if record.state is State.DROPPED or self.is_position_empty(record):
+        if record.state is State.DROPPED or self.is_position_empty(record) or not belief.is_probable:
             return State.LOST, "known to exist, not found again"
         if record.state is State.REJECTED:
             return None
@@ -214,14 +215,16 @@ class Certainty:
 def discard_moved_items(records: Collection[ItemRecord], dropped: Collection[ItemRecord]) -> list[ItemRecord]:
     """Set lost items that a person has moved elsewhere to PHANTOM, and return the phantoms.
 
-    A lost item counts as moved if a new item of the same class appeared at an empty position after the last
-    detection of the lost item; one earlier look at the position suffices if the lost item is known to have
-    left its place. The new item must be proved to exist, and replaces only one lost item.
-    Lost items in `dropped` do not count, because the tool held them after their last detection.
+    An item that may have left its place counts as lost. A lost item counts as moved if a new item of the same
+    class appeared at an empty position after the last detection of the lost item; one earlier look at the
+    position suffices if the lost item is known to have left its place. The new item must be proved to exist,
+    and replaces only one lost item. Lost items in `dropped` do not count, because the tool held them after
+    their last detection.
     """
     new_items = [record for record in records if record.belief.is_confirmed and record.state in FINAL_STATES]
     phantoms = []
-    for lost_item in (record for record in records if record.state is State.LOST and record not in dropped):
+    lost_items = (record for record in records if record.state is State.LOST or record.may_have_left)
+    for lost_item in (record for record in lost_items if record not in dropped):
         candidates = (
             item
             for item in new_items

@@ -25,6 +25,10 @@ REASON_NOT_FOUND = "more looks missed it than saw it"
 REASON_UNCERTAIN = "it has no confident detection"
 """Reason for the rejection of an item with doubtful detections only."""
 
+MIN_REMOVAL_PROBABILITY = 0.05
+"""Minimum probability of a removal (`Belief.removal_probability`) with which the result names a phantom. In
+62 runs of five shipped missions without a removal, no item was a phantom."""
+
 
 class State(Enum):
     """State of an item; the final states are PLACED, REJECTED, SKIPPED, LOST and PHANTOM."""
@@ -94,6 +98,9 @@ class ItemRecord:
         was_taken_away: True if images showed the place of the item empty, because a person removed it.
         was_detected_in_bin: True if a look has shown the placed item in its bin.
         slot: Index of the slot of the bin over which the item was released, or None.
+        has_appeared: True if a look, since the robot last may have moved objects to the position of the first
+            detection, searched this position before the first detection.
+        common_frame_counts: For each near item, number of times that a frame showed both items separately.
     """
 
     item: str
@@ -129,6 +136,8 @@ class ItemRecord:
     was_taken_away: bool = False
     was_detected_in_bin: bool = False
     slot: int | None = None
+    has_appeared: bool = False
+    common_frame_counts: Counter[Item] = field(default_factory=Counter)
 
     def __post_init__(self) -> None:
         self.position = self.first_position
@@ -158,6 +167,12 @@ class ItemRecord:
             self.item, self.label, self.state.value, round_values(self.position, 4),
             self.belief.look_count, self.failed_pick_count, self.bin, self.reason,
         )  # fmt: skip
+
+    @property
+    def may_have_left(self) -> bool:
+        """True if looks showed the item and then missed it, and it is uncertain whether it ever existed."""
+        is_missed = self.state is State.PHANTOM and self.reason == REASON_NOT_FOUND
+        return is_missed and self.belief.removal_probability >= MIN_REMOVAL_PROBABILITY
 
     def distance_to(self, position: Array) -> float:
         """Return the distance [m] of the item from a position `(3,)` [m]."""

@@ -21,12 +21,22 @@ from executive.geometry import Array
 from executive.ledger.belief import ITEM_AREA_FRACTION, Belief, make_viewpoint_key
 from executive.ledger.certainty import MIN_EXISTENCE_PROBABILITY, Certainty
 from executive.ledger.coverage import Coverage
-from executive.ledger.item import ON_TABLE, REASON_NOT_FOUND, REASON_UNCERTAIN, ItemRecord, ItemRecords, State
+from executive.ledger.item import (
+    ON_TABLE,
+    REASON_NOT_FOUND,
+    REASON_UNCERTAIN,
+    SAME_POSITION_TOLERANCE,
+    ItemRecord,
+    ItemRecords,
+    State,
+)
 
 MAX_STANDARD_DEVIATIONS = 3.5
 """Number of standard deviations within which two measurements of a position agree with probability 0.999."""
 AMBIGUITY_FACTOR = 1.5
 """Maximum distance between an item and an observation that may show it, in units of the gating distance."""
+MIN_COMMON_FRAMES = 2
+"""Minimum number of frames that show two near items separately, which proves that they are two objects."""
 MAX_PUSH_DISTANCE = 0.12
 """Maximum distance by which a person may push an item that still counts as the same item [m]."""
 MAX_MISS_PROBABILITY_OF_MOVED_ITEM = 0.05
@@ -103,9 +113,23 @@ def find_moved_item(
 
 
 def find_duplicate(record: ItemRecord, records: Iterable[ItemRecord], gate: float) -> ItemRecord | None:
-    """Return another item within `gate` [m] of an item if both are in the state SEEN, or None."""
-    others = (other for other in records if record.state is other.state is State.SEEN and other is not record)
-    return next((other for other in others if other.distance_to(record.position) < gate), None)
+    """Return another item within `gate` [m] of an item if both are in the state SEEN, or None.
+
+    Two items are two objects if `MIN_COMMON_FRAMES` frames have shown both, or if the last frame shows both,
+    unless their positions agree within `SAME_POSITION_TOLERANCE`: two boxes may show one object.
+    """
+    for other in records:
+        distance = other.distance_to(record.position)
+        is_open = record.state is other.state is State.SEEN
+        if other is record or not is_open or distance >= gate:
+            continue
+        is_shown_separately = other.frame_id == record.frame_id and distance > SAME_POSITION_TOLERANCE
+        if is_shown_separately:
+            record.common_frame_counts[other.item] += 1
+            other.common_frame_counts[record.item] += 1
+        elif record.common_frame_counts[other.item] < 2 * MIN_COMMON_FRAMES:
+            return other
+    return None
 
 
 def _may_be_same_object(
@@ -287,7 +311,8 @@ class LookUpdate:
         phantoms = []
         for record in compress(records, self.look.compute_searched_mask(positions)):
             record.belief.add_miss(self.look.error_rates)
-            if record.belief.existence_probability <= self.config.max_miss_probability:
+            is_improbable = record.belief.existence_probability <= self.config.max_miss_probability
+            if is_improbable and record.belief.removal_probability < 0.5:
                 record.set_state(State.PHANTOM, REASON_NOT_FOUND)
                 phantoms.append(record)
         return phantoms
@@ -327,11 +352,14 @@ class LookUpdate:
         """Add a new item; `prior_odds` are the prior odds that the item exists."""
         belief = Belief(observation.detection.label, math.log(prior_odds))
         position = observation.position
-        was_place_empty = self.coverage.find_miss_probability(position) <= self.config.max_miss_probability
-        return self.records.add(
-            belief, position, self.look.frame, was_place_empty=was_place_empty,
+        miss_probability = self.coverage.find_miss_probability(position)
+        record = self.records.add(
+            belief, position, self.look.frame,
+            was_place_empty=miss_probability <= self.config.max_miss_probability,
             was_place_searched=self.coverage.was_searched(position),
         )  # fmt: skip
+        record.has_appeared = miss_probability < 1.0
+        return record
 
     def _compute_expected_count(self, observation: Observation) -> float:
         """Return the expected number of objects at an observed position that earlier looks have missed."""

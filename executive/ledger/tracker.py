@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 
 import numpy as np
 
@@ -77,7 +78,9 @@ class Tracker:
         """Objects of no item: position `(3,)` [m], and number of further looks until it is forgotten."""
         self._records = ItemRecords(self.emit)
         self._certainty = Certainty(self.config, self.distinct_labels)
-        self._bin_contents = BinContents(self.config, self.bins, self.routes, self._records, self.quotas)
+        self._bin_contents = BinContents(
+            self.config, self.bins, self.routes, self._records, self.quotas, self.classes
+        )
         self._coverage = Coverage(self.table)
         self._confirmed_labels: set[str] = set()
         """Classes that a measurement of the tool has confirmed, and "" after other measurements."""
@@ -260,6 +263,7 @@ class Tracker:
         record.clear_viewpoints()
         record.was_detected_in_bin = False
         self._records.set_placed(record, bin)
+        self._return_items_that_were_not_picked()
 
     def record_put_down(self, item: Item, position: Array) -> None:
         record = self._records.find(item)
@@ -287,6 +291,9 @@ class Tracker:
     def record_collision(self, point: Sequence[float] | None) -> None:
         self.invalidate_positions()
         if point is not None:
+            for record in self._records.filter_by_state(*ON_TABLE):
+                is_touched = math.dist(point[:2], record.position[:2]) <= self.config.gate
+                record.belief.is_confirmed |= is_touched and record.belief.look_count > 0
             self._add_body(np.array(point))
 
     def empty_bins(self, bins: Collection[str]) -> None:
@@ -321,6 +328,14 @@ class Tracker:
                 record.set_state(*final_state)
                 self._records.emit(record)
         self._records.emit(*discard_moved_items(self.records, dropped_items))
+        for record in filter(attrgetter("may_have_left"), self._records.all):
+            x, y, _ = record.position
+            count = record.belief.look_count
+            text = f"{count} look(s) showed {record.item} at ({x:.2f}, {y:.2f}) m, and later looks missed it"
+            self.unexplained.report(
+                f"item {record.item}", f"{text}: it was taken away, or detected by mistake",
+                frame=record.frame_id,
+            )  # fmt: skip
 
     def discard_rejected_and_skipped(self) -> None:
         self._records.failed_picks.clear()
@@ -389,7 +404,8 @@ class Tracker:
         labels = {entry for entry in routed_labels if not self._bin_contents.explain_skipped_class(entry)}
         if routed_labels and not labels:
             return True
-        if self._coverage.max_object_probability > self.config.max_miss_probability:
+        needs_look = any(each.needs_look for each in self._bin_contents.foreign_objects.values())
+        if needs_look or self._coverage.max_object_probability > self.config.max_miss_probability:
             return False
         if self.unexplained.needs_look:
             return False
@@ -466,7 +482,10 @@ class Tracker:
         for record in update.apply(observations_on_table):
             self._certainty.reject_if_uncertain(record, is_unmoved=self._coverage.is_unmoved(record))
             self._records.emit(record)
+        self._return_items_that_were_not_picked()
         if detections.view == "full":
+            for text in self._bin_contents.record_contents(detections, bin_names):
+                self.unexplained.report(text, text, frame=detections.frame.id)
             self._bin_contents.confirm_placed_items(detections, observations)
             self._bin_contents.mark_dropped_items_as_placed(detections, bin_names)
 
@@ -477,6 +496,20 @@ class Tracker:
             self.unexplained.report("empty table", text, frame=detections.frame.id)
         else:
             self.unexplained.withdraw("empty table")
+
+    def _return_items_that_were_not_picked(self) -> None:
+        """Replace each placed item by the item that looks showed at its place after the pick."""
+        for placed in self._records.filter_by_state(State.PLACED):
+            # In a cell with stacks, the place may show a lower object.
+            if self.table.stacked or (left := self._bin_contents.find_item_left_behind(placed)) is None:
+                continue
+            self.false_grasp_count += 1
+            text = f"looks showed {left.item} where {placed.item} had been picked: {placed.bin} received"
+            self.unexplained.report(f"pick {placed.item}", f"{text} another object, or nothing")
+            placed.bin = ""
+            placed.slot = None
+            placed.set_state(State.PHANTOM, f"it is {left.item}")
+            self._records.emit(placed)
 
     def _add_body(self, position: Array) -> None:
         """Record an object of no item at `position` `(3,)` [m], unless an item or a bin is there."""
