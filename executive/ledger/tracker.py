@@ -6,7 +6,6 @@ import math
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from operator import attrgetter
 
 import numpy as np
 
@@ -328,7 +327,8 @@ class Tracker:
                 record.set_state(*final_state)
                 self._records.emit(record)
         self._records.emit(*discard_moved_items(self.records, dropped_items))
-        for record in filter(attrgetter("may_have_left"), self._records.all):
+        missed = [record for record in self._records.all if record.may_have_left]
+        for record in (each for each in missed if each.label not in self.unknown_labels):
             x, y, _ = record.position
             count = record.belief.look_count
             text = f"{count} look(s) showed {record.item} at ({x:.2f}, {y:.2f}) m, and later looks missed it"
