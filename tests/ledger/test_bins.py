@@ -96,6 +96,41 @@ def test_one_object_more_in_a_bin_of_its_class_than_was_let_go_there_is_the_drop
     assert bench.states()["cube-2"] == ("placed", "pink_bin")
 
 
+def test_an_object_that_was_in_the_bin_at_the_start_is_not_the_dropped_one(bench: Bench) -> None:
+    bench.look(CUBE, IN_RED, view="full")
+    bench.drop("cube-1")
+    bench.look(IN_RED, view="full")
+    assert bench.states()["cube-1"][0] == "dropped"
+    bench.look(IN_RED, ("cube", 0.2, -0.36), view="full")
+    assert bench.states()["cube-1"] == ("placed", "red_bin")
+
+
+@pytest.mark.parametrize(
+    ("label", "shown_count", "is_named"), [("duck", 3, True), ("duck", 2, False), ("cube", 3, False)]
+)
+def test_three_looks_name_an_object_in_a_bin_where_its_class_does_not_belong(
+    bench: Bench, label: str, shown_count: int, is_named: bool
+) -> None:
+    for number in range(4):
+        bench.look(*[(label, 0.2, -0.44)] * (number < shown_count), view="full")
+        assert not (bench.ledger.is_table_empty() and label == "duck" and number + 1 < shown_count)
+    assert [event.text.split(",")[0] for event in bench.ledger.unexplained.events] == [
+        "images show a duck in red_bin"
+    ] * is_named
+
+
+@pytest.mark.parametrize("between", [[], [()]], ids=["seen at once", "appeared later"])
+def test_an_item_that_looks_show_where_it_was_picked_is_not_in_the_bin(bench: Bench, between: list) -> None:
+    bench.look(CUBE)
+    bench.place("cube-1")
+    for things in [*between, (CUBE,), (CUBE,)]:
+        bench.look(*things)
+    is_replaced = not between
+    assert bench.ledger.count_objects_in("red_bin") == (not is_replaced)
+    assert bench.states()["cube-1"] == (("phantom", "it is cube-2") if is_replaced else ("placed", "red_bin"))
+    assert len(bench.ledger.unexplained.events) == bench.ledger.false_grasp_count == is_replaced
+
+
 @pytest.mark.parametrize(
     ("shown", "placed"),
     [([IN_RED], ["red_bin"]), ([("cube", 0.2, 0.44), IN_RED], ["red_bin"]), ([("cube", -0.2, 0.44)], [])],

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ledger_bench import Bench, Thing
+from ledger_bench import EYE, Bench, Thing
 
 from executive.cell.frame import ErrorRates, assume_rates
 from executive.cell.objects import ObjectClass, Target
@@ -132,6 +132,36 @@ def test_what_looks_agree_on_decides_what_becomes_of_an_item(
     assert bench.end() == {"cube-1": final}
     counts = {"placed": 0, "rejected": 0, "skipped": 0, "lost": 0, "phantom": 0, final[0]: 1}
     assert bench.ledger.count_states() == {"seen": int(final != PHANTOM), **counts}
+
+
+@pytest.mark.parametrize(
+    ("look_count", "final", "is_named"), [(1, "phantom", True), (3, "phantom", True), (4, "lost", False)]
+)
+def test_an_item_that_was_seen_and_then_missed_was_taken_away_or_is_named(
+    bench: Bench, look_count: int, final: str, is_named: bool
+) -> None:
+    rates = replace(EYE, false_detections=0.015, repeated=0.6)
+    for _ in range(look_count):
+        bench.look(CUBE, by=rates)
+    for _ in range(2):
+        bench.look(by=rates)
+    assert bench.end()["cube-1"][0] == final
+    assert len(bench.ledger.unexplained.events) == is_named
+
+
+def test_an_item_that_flickers_never_existed(bench: Bench) -> None:
+    for things in [(CUBE,), (), (CUBE,), (), ()]:
+        bench.look(*things, by=replace(EYE, repeated=0.6))
+    assert (bench.end()["cube-1"], bench.ledger.unexplained.events) == (PHANTOM, [])
+
+
+@pytest.mark.parametrize(("distance", "item_count"), [(0.017, 2), (0.005, 1)])
+def test_two_detections_in_one_frame_are_two_objects_unless_their_positions_agree(
+    bench: Bench, distance: float, item_count: int
+) -> None:
+    for _ in range(3):
+        targets = bench.look(CUBE, ("cube", 0.5 + distance, 0.0))
+    assert len(targets) == item_count
 
 
 def test_an_item_that_is_given_up_in_the_tool_stays_there_until_it_is_released(bench: Bench) -> None:

@@ -131,6 +131,46 @@ def test_what_does_not_come_off_is_stuck_and_not_placed(
     assert (fake.ledger.find_held_item(), fake.ledger.count_states()["placed"]) == (held, 0)
 
 
+def test_a_seal_that_is_felt_before_the_tool_closes_is_not_believed(fake: FakeCell, target: Target) -> None:
+    run_skill(Approach(target=target), fake)
+    intercept(fake, "tool.holding", lambda: True)
+    assert run_skill(Grasp(target=target), fake).reason == "sensor_implausible"
+    assert fake.ledger.find_held_item() is None
+
+
+def test_an_item_that_weighs_nothing_is_not_held_and_three_in_a_row_discredit_the_sensor(
+    fake: FakeCell, held: str, look: Look
+) -> None:
+    fake.tool.load_error = -fake.cell.get_weight("cube")
+    for number in range(3):
+        assert run_skill(Transit(held=held, bin="red_bin"), fake).reason == "dropped"
+        assert (fake.tool.holding, fake.ledger.describe(held).attempts) == (False, number + 1)
+        fake.ledger.record_grasp(held)
+        fake.world.held_object = fake.world.objects[0]
+    fake.tool.open()
+    result = run_skill(Grasp(target=fake.ledger._records.find(held).target), fake)
+    assert (result.reason, "3 times in a row" in result.message) == ("sensor_implausible", True)
+
+
+def test_a_sensor_that_reports_an_object_in_free_air_is_named(fake: FakeCell, held: str) -> None:
+    fake.world.objects.clear()
+    fake.world.held_object = None
+    intercept(fake, "tool.holding", lambda: True)
+    assert run_skill(Transit(held=held, bin="red_bin"), fake).reason == "sensor_implausible"
+    assert fake.ledger.describe(held).state == "lost"
+
+
+def test_a_load_cell_without_noise_is_no_evidence(fake: FakeCell, held: str) -> None:
+    intercept(fake, "tool.load", lambda: fake.ledger.empty_load)
+    assert run_skill(Transit(held=held, bin="red_bin"), fake).status == "SUCCESS"
+
+
+def test_what_the_load_cell_still_feels_after_the_release_is_stuck(fake: FakeCell, held: str) -> None:
+    run_skill(Transit(held=held, bin="red_bin"), fake)
+    fake.tool.load_error = fake.cell.get_weight("cube")
+    assert run_skill(Release(held=held, bin="red_bin"), fake).reason == "stuck"
+
+
 def test_an_item_is_given_up_with_its_reason_after_the_failures_the_mission_grants(
     fake: FakeCell, target: Target
 ) -> None:
