@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from executive.behaviours import load_skills
 from executive.cell.devices import TrueObject
-from executive.cell.objects import UNKNOWN_LABEL
-from executive.drivers.sim.driver import SimDriver
+from executive.cell.objects import BIN_THICKNESS, UNKNOWN_LABEL
+from executive.drivers.sim.driver import MIN_CENTRE_HEIGHT, SimDriver
 from executive.events import ItemChanged
 from executive.ledger.item import State
 from executive.mission.load import load_mission
@@ -36,11 +36,15 @@ END_PLACES = ("wrong_bin", "right", "left", "elsewhere")
 
 @dataclass(frozen=True)
 class Report:
-    """Class and state of an item after its last change in the journal, with the reason of the state or ""."""
+    """Class and state of an item after its last change in the journal, with the reason of the state or "".
+
+    `bin` is the bin into which it was placed, or "".
+    """
 
     label: str
     state: str
     reason: str
+    bin: str = ""
 
     @property
     def is_doubted(self) -> bool:
@@ -60,6 +64,10 @@ class FoundObject:
         items: Items that stand for it: the one with which it was carried last, else those first seen where
             it stood.
         reports: What the journal says last about these items.
+        true_place: The bin of the world that contains it, whatever the cell file says about bins; `tool`,
+            `taken away`, `floor` or `table`.
+        is_sorted: True if `true_place` is a permitted bin of its class.
+        was_carried: True if the tool held it at any time.
     """
 
     label: str
@@ -68,6 +76,9 @@ class FoundObject:
     fell_in_wrong_bin: bool
     items: tuple[str, ...]
     reports: tuple[Report, ...] = ()
+    true_place: str = ""
+    is_sorted: bool = False
+    was_carried: bool = False
 
     @property
     def is_in_wrong_bin(self) -> bool:
@@ -87,6 +98,8 @@ class AuditedRun:
         objects: The objects; none if there is no result.
         robot_time: Time on the clock of the run [s].
         run: Run directory; "" if there is none.
+        items: What the journal says last about each item.
+        unexplained_count: Number of entries `unexplained` of the result.
     """
 
     mission: str
@@ -96,6 +109,8 @@ class AuditedRun:
     objects: tuple[FoundObject, ...] = ()
     robot_time: float = 0.0
     run: str = ""
+    items: tuple[Report, ...] = ()
+    unexplained_count: int = 0
 
     @property
     def known(self) -> list[FoundObject]:
@@ -106,6 +121,11 @@ class AuditedRun:
     def right(self) -> int:
         """Number of objects of the cell's classes in a right bin."""
         return sum(one.place == "right" for one in self.known)
+
+    @property
+    def misplaced(self) -> list[FoundObject]:
+        """The objects, unknown ones included, that are in no right bin of the world."""
+        return [one for one in self.objects if not one.is_sorted]
 
     @property
     def in_wrong_bin(self) -> list[FoundObject]:
@@ -167,13 +187,37 @@ class AuditedCell(Station):
         ]
         if final_object.body in self._carried:
             items = [self._carried[final_object.body]]
+        true_place = self.find_true_place(final_object)
         return FoundObject(
             label=final_object.label,
             place=next((place for place in END_PLACES if counts[place]), ""),
             bin=final_object.bin,
             fell_in_wrong_bin=bool(counts["fell_in_wrong_bin"]),
             items=tuple(dict.fromkeys(items)),
+            true_place=true_place,
+            is_sorted=true_place in self.routes.get(final_object.label, ()),
+            was_carried=final_object.body in self._carried,
         )
+
+    def find_true_place(self, true_object: TrueObject) -> str:
+        """Return `FoundObject.true_place` of an object."""
+        if self.driver.tool.held_body == true_object.body:
+            return "tool"
+        if true_object.is_removed:
+            return "taken away"
+        if true_object.position[2] < MIN_CENTRE_HEIGHT:
+            return "floor"
+        world = self.driver.world
+        for name, body in world.bin_bodies.items():
+            centre, _ = world.client.getBasePositionAndOrientation(body)
+            true_bin = replace(self.cell.bins[name], position=np.array(centre))
+            if true_bin.contains(true_object.position, BIN_THICKNESS):
+                return name
+        return "table"
+
+
+Change: TypeAlias = Callable[[AuditedCell], Any]
+"""Function that changes a station before its run."""
 
 
 def run_audited(
@@ -183,10 +227,14 @@ def run_audited(
     scene: Path | None = None,
     make_detector: KindMaker = make_installed_kind,
     wall_time_limit: float = WALL_TIME_LIMIT,
+    change: Change = lambda _: None,
 ) -> AuditedRun:
-    """Record a run below `runs` in a forked process, which is killed after `wall_time_limit` [s]."""
+    """Record a run below `runs` in a forked process, which is killed after `wall_time_limit` [s].
+
+    `change` is called with the station before the run.
+    """
     answer, problem = ForkRunner(wall_time_limit).call(
-        lambda: _run_in_this_process(mission, seed, runs, scene, make_detector)
+        lambda: _run_in_this_process(mission, seed, runs, scene, make_detector, change)
     )
     if isinstance(answer, AuditedRun):
         return answer
@@ -194,25 +242,30 @@ def run_audited(
 
 
 def _run_in_this_process(
-    mission: str, seed: int, runs: Path, scene: Path | None, make_detector: KindMaker
+    mission: str, seed: int, runs: Path, scene: Path | None, make_detector: KindMaker, change: Change
 ) -> AuditedRun:
     cells: list[AuditedCell] = []
 
     def make_cell(*arguments: Any, **options: Any) -> AuditedCell:
         cells.append(AuditedCell(*arguments, **options, make_detector=make_detector))
+        change(cells[0])
         return cells[0]
 
     loaded = load_mission(mission, load_skills(), {}, load_checker)
     driver_options = {"scene": str(scene)} if scene else {}
     options = RunOptions(seed, make_cell=make_cell, driver_options=driver_options)
     result = record_run(loaded, options, runs, RecordOptions(saves_pictures=False))
+    events = (timed.event for timed in read_journal(Path(result.run) / "journal.jsonl"))
     reports = {
-        timed.event.item: Report(timed.event.label, timed.event.state, timed.event.reason)
-        for timed in read_journal(Path(result.run) / "journal.jsonl")
-        if isinstance(timed.event, ItemChanged)
+        event.item: Report(event.label, event.state, event.reason, event.bin)
+        for event in events
+        if isinstance(event, ItemChanged)
     }
     objects = tuple(
         replace(one, reports=tuple(reports[item] for item in one.items if item in reports))
         for one in cells[0].objects
     )
-    return AuditedRun(mission, seed, result.status, result.message, objects, result.robot_time_s, result.run)
+    return AuditedRun(
+        mission, seed, result.status, result.message, objects, result.robot_time_s, result.run,
+        tuple(reports.values()), len(getattr(result, "unexplained", ())),
+    )  # fmt: skip
