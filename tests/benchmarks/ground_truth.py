@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
@@ -51,6 +51,10 @@ class Report:
         """True if it tells a reader that the item may not be where it belongs."""
         return self.state in ("rejected", "lost") or (self.state == "placed" and bool(self.reason))
 
+    def names_object(self) -> bool:
+        """Return True if it tells a reader that an object is not in its bin."""
+        return self.state in ("rejected", "lost", "skipped")
+
 
 @dataclass(frozen=True)
 class FoundObject:
@@ -65,7 +69,7 @@ class FoundObject:
             it stood.
         reports: What the journal says last about these items.
         true_place: The bin of the world that contains it, whatever the cell file says about bins; `tool`,
-            `taken away`, `floor` or `table`.
+            `floor` or `table`.
         is_sorted: True if `true_place` is a permitted bin of its class.
         was_carried: True if the tool held it at any time.
     """
@@ -121,11 +125,6 @@ class AuditedRun:
     def right(self) -> int:
         """Number of objects of the cell's classes in a right bin."""
         return sum(one.place == "right" for one in self.known)
-
-    @property
-    def misplaced(self) -> list[FoundObject]:
-        """The objects, unknown ones included, that are in no right bin of the world."""
-        return [one for one in self.objects if not one.is_sorted]
 
     @property
     def in_wrong_bin(self) -> list[FoundObject]:
@@ -187,15 +186,15 @@ class AuditedCell(Station):
         ]
         if final_object.body in self._carried:
             items = [self._carried[final_object.body]]
-        true_place = self.find_true_place(final_object)
+        place = self.find_true_place(final_object)
         return FoundObject(
             label=final_object.label,
             place=next((place for place in END_PLACES if counts[place]), ""),
             bin=final_object.bin,
             fell_in_wrong_bin=bool(counts["fell_in_wrong_bin"]),
             items=tuple(dict.fromkeys(items)),
-            true_place=true_place,
-            is_sorted=true_place in self.routes.get(final_object.label, ()),
+            true_place=place,
+            is_sorted=place in self.routes.get(final_object.label, ()),
             was_carried=final_object.body in self._carried,
         )
 
@@ -203,20 +202,17 @@ class AuditedCell(Station):
         """Return `FoundObject.true_place` of an object."""
         if self.driver.tool.held_body == true_object.body:
             return "tool"
-        if true_object.is_removed:
-            return "taken away"
         if true_object.position[2] < MIN_CENTRE_HEIGHT:
             return "floor"
         world = self.driver.world
         for name, body in world.bin_bodies.items():
-            centre, _ = world.client.getBasePositionAndOrientation(body)
-            true_bin = replace(self.cell.bins[name], position=np.array(centre))
-            if true_bin.contains(true_object.position, BIN_THICKNESS):
+            centre = np.array(world.client.getBasePositionAndOrientation(body)[0])
+            if replace(self.cell.bins[name], position=centre).contains(true_object.position, BIN_THICKNESS):
                 return name
         return "table"
 
 
-Change: TypeAlias = Callable[[AuditedCell], Any]
+Change = Callable[[AuditedCell], None]
 """Function that changes a station before its run."""
 
 

@@ -26,6 +26,7 @@ from tests.benchmarks import (
     soak,
     suction_map,
     tick,
+    wrong_sources,
 )
 from tests.benchmarks.detector_variants import list_variants
 from tests.benchmarks.forks import ForkRunner
@@ -163,3 +164,12 @@ def test_a_run_is_audited_object_by_object_or_hung(tmp_path: Path) -> None:
     run = run_audited(OVERHEAD, 1, tmp_path)
     assert run.status == "SUCCESS" and run.right == len(run.known) > 2 and run.unreported == []
     assert run_audited(OVERHEAD, 1, tmp_path, wall_time_limit=0.5).status == "HUNG"
+
+
+def test_success_is_silent_if_a_bin_contains_something_else_than_its_items() -> None:
+    case = next(wrong_sources.list_cases())
+    found = FoundObject("cube", "right", "red_bin", False, (), true_place="blue_bin", was_carried=True)
+    items = (Report("cube", "placed", "", "red_bin"),)
+    done = wrong_sources.Done(case, AuditedRun(OVERHEAD, 1, "SUCCESS", "", (found,), 2.0, items=items))
+    assert done.silence.count(";") == 1 and done.problem.startswith("silent: cube in blue_bin")
+    assert replace(done, run=replace(done.run, status="INCOMPLETE")).problem == ""

@@ -10,9 +10,10 @@ from __future__ import annotations
 import re
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +33,15 @@ from executive.geometry import Pose, rotate_about_z
 from executive.perception.camera_model import project
 from executive.processes import WorkerPool
 from executive.station.border import Access
-from tests.benchmarks.ground_truth import FAULT, HUNG, WALL_TIME_LIMIT, AuditedCell, AuditedRun, run_audited
+from tests.benchmarks.ground_truth import (
+    FAULT,
+    HUNG,
+    WALL_TIME_LIMIT,
+    AuditedCell,
+    AuditedRun,
+    Report,
+    run_audited,
+)
 from tests.benchmarks.report import Figures, run_command, show_progress, write_json
 
 CASES = Path(__file__).with_suffix(".yaml")
@@ -49,13 +58,11 @@ NEW_NOISE = NoiseConfig(gain=0.01, read=2.0)
 """Noise that is added to a frozen image."""
 BOX = """<robot name="box"><link name="box">
 <inertial><mass value="{mass}"/><inertia ixx="1e-4" ixy="0" ixz="0" iyy="1e-4" iyz="0" izz="1e-4"/></inertial>
-<visual><geometry><box size="{size}"/></geometry></visual>
-<collision><geometry><box size="{size}"/></geometry></collision></link></robot>"""
+<visual><geometry><box size="{0} {1} {2}"/></geometry></visual>
+<collision><geometry><box size="{0} {1} {2}"/></geometry></collision></link></robot>"""
 """URDF of a box."""
 BOX_DENSITY = 800.0
 """Density of boxes [kg/m³]."""
-RED = (0.85, 0.20, 0.18)
-"""A colour of all classes."""
 Numbers = Sequence[float]
 """Type of the lists of numbers in `CASES`."""
 
@@ -117,10 +124,8 @@ def falsify(station: AuditedCell, attribute: str, value: str) -> None:
         random = np.random.default_rng(station.driver.world.step_count).random()
         return eval(value, {**names, "value": true_value, "random": random})
 
-    def write(tool: Any, true_value: Any) -> None:
-        vars(tool)[attribute] = true_value
-
-    tool.__class__ = type(kind.__name__, (kind,), {attribute: property(read, write)})
+    value_property = property(read, lambda tool, true_value: vars(tool).update({attribute: true_value}))
+    tool.__class__ = type(kind.__name__, (kind,), {attribute: value_property})
 
 
 def fail_grasps(station: AuditedCell, numbers: Numbers) -> None:
@@ -148,7 +153,7 @@ def film(
         station: The station of the run.
         image: `frozen`: always that with the number `first`; `late`: that before.
         stamp: `frozen`: always that of the image with the number `first`.
-        pixels: Expression of the `pixels` of an image, and of the random numbers `rng`.
+        pixels: Expression of the true `pixels`, with `cv2` and `add_noise`.
         first: Number of the last image without a change; 0: all are changed.
     """
     camera: Any = station.driver.camera
@@ -161,15 +166,10 @@ def film(
         if len(images) <= first:
             return images[-1]
         changed = images[sources[image]]._replace(stamp=images[sources[stamp]].stamp)
-        names = {
-            "cv2": cv2,
-            "add_noise": add_noise,
-            "noise": NEW_NOISE,
-            "rng": np.random.default_rng(len(images)),
-        }
+        rng = np.random.default_rng(len(images))
+        names = {"cv2": cv2, "add_noise": partial(add_noise, noise=NEW_NOISE, rng=rng)}
         for name in ("colour", "depth")[: 1 if changed.depth is None else 2]:
-            value = np.ascontiguousarray(eval(pixels, {**names, "pixels": getattr(changed, name)}))
-            changed = changed._replace(**{name: value})
+            changed = changed._replace(**{name: eval(pixels, {**names, "pixels": getattr(changed, name)})})
         return changed
 
     camera.capture = capture_changed
@@ -185,16 +185,17 @@ def put_bin(station: AuditedCell, name: str, place: Numbers = (), colour: Number
         world.client.changeVisualShape(body, -1, index, rgbaColor=[*colour, 1])
 
 
-def pile(station: AuditedCell, bodies: Sequence[Any], bin: str = "", colour: Numbers = RED) -> None:
+def pile(
+    station: AuditedCell, bodies: Sequence[Any], bin: str = "", colour: Numbers = (0.85, 0.2, 0.18)
+) -> None:
     """Put bodies in place of the first object, or into a bin, each with an offset x, y, z [mm] or none.
 
     A body is a class, or length, width and height of a box [mm], which is an unknown object.
     """
     world = station.driver.world
-    base = [*station.cell.bins[bin].position[:2], BIN_THICKNESS] if bin else [0.0, 0.0, 0.0]
+    first = station.driver.list_objects()[0]
+    base = [*station.cell.bins[bin].position[:2], BIN_THICKNESS] if bin else [*first.position[:2], 0.0]
     if not bin:
-        first = station.driver.list_objects()[0]
-        base[:2] = first.position[:2]
         world.remove_object(first.body, is_counted=False)
     for body, *offset in bodies:
         x, y, z = np.add(base, np.array(offset or [0, 0, 0]) / 1000)
@@ -207,11 +208,10 @@ def pile(station: AuditedCell, bodies: Sequence[Any], bin: str = "", colour: Num
 
 
 def _make_box(size: Numbers) -> ObjectConfig:
-    length, width, height = np.array(size) / 1000
+    sides = np.array(size) / 1000
     path = Path(tempfile.mkdtemp()) / "box.urdf"
-    mass = BOX_DENSITY * length * width * height
-    path.write_text(BOX.format(size=f"{length} {width} {height}", mass=mass))
-    return ObjectConfig(urdf=str(path), height=height, radius=float(np.hypot(length, width) / 2))
+    path.write_text(BOX.format(*sides, mass=BOX_DENSITY * sides.prod()))
+    return ObjectConfig(urdf=str(path), height=sides[2], radius=float(np.hypot(*sides[:2]) / 2))
 
 
 def move(station: AuditedCell, source: str = "table", goal: Numbers = (), count: int = 1) -> bool:
@@ -222,9 +222,8 @@ def move(station: AuditedCell, source: str = "table", goal: Numbers = (), count:
         right_bins = station.routes.get(each.label, ())
         wrong_bin = next(bin for name, bin in station.cell.bins.items() if name not in right_bins)
         # Wrong bins may contain something in the middle.
-        position = np.add(
-            goal or wrong_bin.position, [0.0, 0.07 * number, 0.0] if goal else [0.05, 0.08, 0.05]
-        )
+        offset = [0.0, 0.07 * number, 0.0] if goal else [0.05, 0.08, 0.05]
+        position = np.add(goal or wrong_bin.position, offset)
         station.driver.world.place_object(each.body, Pose(each.X_WO.rotation, position))
     return bool(objects)
 
@@ -252,7 +251,7 @@ class Case:
         name: What is wrong.
         number: Position among all cases, from which its seeds follow.
         mission: Shipped name of the mission.
-        changes: Functions of `CHANGES` with their arguments; `at`: time at which it is called [s].
+        changes: Functions of `CHANGES` with their arguments; `at`: time at which one is called [s].
         scene: Content of the scene file; empty: the world as the cell file declares it.
         first_seed: Seed of the first run, or None.
     """
@@ -271,13 +270,14 @@ class Case:
     def install(self, station: AuditedCell) -> None:
         """Make the source wrong, now or in a tick, and end the run when it takes too long."""
         clock = station.driver.clock
-        pending = [_bind_change(station, **change) for change in self.changes]
+        pending = list(self.changes)
         limit = END_TIME_RATIO * USUAL_TIMES[self.mission] * len(station.driver.list_objects())
 
         def advance() -> None:
-            for start, change in list(pending):
-                if start <= clock.now and change() is not False:
-                    pending.remove((start, change))
+            for change in list(pending):
+                name = next(iter(change))
+                if clock.now >= change.get("at", 0.0) and CHANGES[name](station, **change[name]) is not False:
+                    pending.remove(change)
             if limit <= clock.now < limit + clock.step:
                 raise Fault(f"the run has not ended after {limit:.0f} s on its clock")
 
@@ -285,21 +285,13 @@ class Case:
         station.tick_callbacks.append(advance)
 
 
-def _bind_change(station: AuditedCell, at: float = 0.0, **call: Any) -> tuple[float, Callable[[], Any]]:
-    """Return the time of a change [s] and the function that makes it."""
-    ((name, arguments),) = call.items()
-    return at, partial(CHANGES[name], station, **arguments)
-
-
 def list_cases() -> Iterator[Case]:
     """Yield all cases."""
-    number = 0
+    numbers = count()
     for kind, entries in yaml.safe_load(CASES.read_text())["cases"].items():
         for entry in entries:
-            values = dict(entry)
-            for mission in values.pop("missions", ["sort_overhead"]):
-                yield Case(kind, number=number, mission=mission, **values)
-                number += 1
+            for mission in entry.pop("missions", ["sort_overhead"]):
+                yield Case(kind, number=next(numbers), mission=mission, **entry)
 
 
 @dataclass(frozen=True)
@@ -314,30 +306,22 @@ class Done:
         """What a run that ended with SUCCESS does not say, else ""."""
         if self.run.status != "SUCCESS":
             return ""
-        misplaced = [
-            f"{each.label} in {each.true_place}"
-            for each in self.run.misplaced
-            if not any(report.state in ("rejected", "lost", "skipped") for report in each.reports)
-        ]
-        placed = Counter((each.bin, each.label) for each in self.run.items if each.state == "placed")
-        brought = Counter(
-            (each.true_place, each.label)
-            for each in self.run.objects
-            if each.was_carried and each.true_place.endswith("bin")
-        )
-        false_entries = [
-            f"{placed[pair]} instead of {brought[pair]} {pair[1]} in {pair[0]}"
-            for pair in sorted(placed | brought)
-            if placed[pair] != brought[pair]
-        ]
-        return "; ".join(misplaced + false_entries)
+        misplaced = [one for one in self.run.objects if not one.is_sorted]
+        unnamed = [one for one in misplaced if not any(map(Report.names_object, one.reports))]
+        sentences = [f"{one.label} in {one.true_place}" for one in unnamed]
+        carried = [one for one in self.run.objects if one.was_carried and one.true_place.endswith("bin")]
+        brought = Counter(f"{one.label} in {one.true_place}" for one in carried)
+        placed = Counter(f"{item.label} in {item.bin}" for item in self.run.items if item.state == "placed")
+        if placed != brought:
+            sentences.append(f"{dict(placed)} was reported as placed, but {dict(brought)} was")
+        return "; ".join(sentences)
 
     @property
     def is_unnamed(self) -> bool:
         """True if a run without SUCCESS names fewer items than objects are not where they belong."""
-        states = [each.state for each in self.run.items]
-        named_count = sum(map(states.count, ("rejected", "lost", "skipped"))) + self.run.unexplained_count
-        return self.run.status in ("INCOMPLETE", "FAILURE") and len(self.run.misplaced) > named_count
+        misplaced_count = sum(not one.is_sorted for one in self.run.objects)
+        named_count = sum(map(Report.names_object, self.run.items)) + self.run.unexplained_count
+        return self.run.status in ("INCOMPLETE", "FAILURE") and misplaced_count > named_count
 
     @property
     def time_ratio(self) -> float:
@@ -354,14 +338,12 @@ class Done:
         return f"slow: {self.time_ratio:.1f} times the usual time" if self.time_ratio > MAX_TIME_RATIO else ""
 
 
-def run_case(case: Case, seed: int, runs_folder: Path, wall_time_limit: float) -> Done:
-    """Run a case with a seed."""
+def run_case(case: Case, seed: int, runs_folder: Path, limit: float) -> Done:
+    """Run a case with a seed; `limit` is its largest wall time [s]."""
     with tempfile.TemporaryDirectory() as folder:
         scene = Path(folder) / "scene.yaml"
         scene.write_text(yaml.safe_dump({"scene": case.name, **case.scene}))
-        run = run_audited(
-            case.mission, seed, runs_folder, scene, wall_time_limit=wall_time_limit, change=case.install
-        )
+        run = run_audited(case.mission, seed, runs_folder, scene, wall_time_limit=limit, change=case.install)
     return Done(case, run)
 
 
@@ -384,10 +366,10 @@ def measure(
     with WorkerPool(workers) as pool:
         jobs = []
         for case in list_cases():
-            if re.search(only, str(case)):
-                first = case.first_seed or first_seed + SEEDS_PER_CASE * case.number
-                for seed in range(first, first + min(seeds_per_case, SEEDS_PER_CASE)):
-                    jobs.append(pool.submit(run_case, case, seed, runs_folder, wall_time_limit))
+            first = case.first_seed or first_seed + SEEDS_PER_CASE * case.number
+            run_count = min(seeds_per_case, SEEDS_PER_CASE) if re.search(only, str(case)) else 0
+            for seed in range(first, first + run_count):
+                jobs.append(pool.submit(run_case, case, seed, runs_folder, wall_time_limit))
         done = [job.result() for job in show_progress(jobs, "wrong sources")]
     figures = {"runs": len(done), "first_seed": first_seed, **summarize(done)}
     all_runs = [{"name": str(each.case), "problem": each.problem, **asdict(each)} for each in done]
@@ -404,13 +386,13 @@ def summarize(done: Sequence[Done]) -> Figures:
 
 
 def _make_row(kind: str, done: Sequence[Done]) -> Figures:
-    statuses = ("SUCCESS", "INCOMPLETE", "FAILURE", FAULT, HUNG)
+    statuses = [each.run.status for each in done]
     return {
         "kind": kind,
         "runs": len(done),
         "silent": sum(bool(each.silence) for each in done),
         "unnamed": sum(each.is_unnamed for each in done),
-        **{status: sum(each.run.status == status for each in done) for status in statuses},
+        **{each: statuses.count(each) for each in ("SUCCESS", "INCOMPLETE", "FAILURE", FAULT, HUNG)},
         "slowest ratio": max((each.time_ratio for each in done), default=0.0),
     }
 
