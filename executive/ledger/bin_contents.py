@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from executive.cell.config import LedgerConfig
-from executive.cell.frame import Detections, ErrorRates, Observation
+from executive.cell.frame import Detections, ErrorRates, Observation, Region
 from executive.cell.objects import BIN_THICKNESS, Bin, ObjectClass, Quotas, is_quota_reached
 from executive.cell.protocols import Presence, Routes
 from executive.geometry import Array
@@ -27,10 +27,6 @@ LOG_ODDS_FELL_IN_BIN = math.log(0.95 / 0.05)
 """Prior log odds that a dropped item lies in the bin over which it was predicted to land."""
 BIN_AREA_FRACTION = 0.04
 """Fraction of an image that a bin covers: probability that a false detection lies in the bin."""
-MIN_HITS_OF_FOREIGN_OBJECT = 3
-"""Minimum number of full images that prove an object in a bin in which its class does not belong."""
-MAX_LOOKS_AT_FOREIGN_OBJECT = 6
-"""Maximum number of full images since the first one with a foreign object for which the run waits."""
 MIN_LOOKS_AT_ITEM_LEFT_BEHIND = 2
 """Minimum number of looks that prove an item at a place from which another item was picked."""
 OFF_TABLE = (State.HELD, State.DROPPED, State.PLACED)
@@ -40,32 +36,6 @@ FLOOR_POINTS = np.array([(0, 0, 0), (1, 1, 0), (1, -1, 0), (-1, 1, 0), (-1, -1, 
 
 BinNameByObservation = Mapping[Observation, str | None]
 """Name of the bin in which each observed object lies, or None."""
-
-
-@dataclass(eq=False)
-class ForeignObject:
-    """An object that no item explains, in a bin in which its class does not belong.
-
-    Attributes:
-        look_count: Number of full images since the first that showed the object.
-        hit_count: Number of full images that showed the object.
-        miss_count: Number of full images that showed the whole floor of the bin, but not the object.
-    """
-
-    look_count: int = 0
-    hit_count: int = 0
-    miss_count: int = 0
-
-    @property
-    def is_certain(self) -> bool:
-        """True if enough images showed the object."""
-        return self.hit_count >= MIN_HITS_OF_FOREIGN_OBJECT
-
-    @property
-    def needs_look(self) -> bool:
-        """True if a further image may prove or disprove the object."""
-        is_disproved = self.miss_count >= self.hit_count
-        return not self.is_certain and not is_disproved and self.look_count < MAX_LOOKS_AT_FOREIGN_OBJECT
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +52,6 @@ class BinContents:
         classes: Classes of the cell by label.
         initial_counts: Maximum number of objects that full images showed before the first pick, by detected
             class and bin.
-        foreign_objects: Objects of a detected class in a bin that no item explains, by both.
     """
 
     config: LedgerConfig
@@ -93,7 +62,6 @@ class BinContents:
     classes: Mapping[str, ObjectClass]
     contradictions: dict[str, str] = field(default_factory=dict)
     initial_counts: Counter[tuple[str, str]] = field(default_factory=Counter)
-    foreign_objects: dict[tuple[str, str], ForeignObject] = field(default_factory=dict)
 
     def count_objects_in(self, bin_name: str, label: str | None = None) -> int:
         """Return the number of items that were released in a bin or have probably fallen into the bin.
@@ -112,10 +80,8 @@ class BinContents:
         placed = [each for each in self.records.filter_by_state(State.PLACED) if each.bin in bins]
         phantoms = self.records.filter_by_state(State.PHANTOM)
         # A phantom after a failed pick may be an object that the pick pushed away.
-        for key in self.initial_counts.keys() | self.foreign_objects.keys():
-            if key[1] in bins:
-                self.initial_counts.pop(key, None)
-                self.foreign_objects.pop(key, None)
+        for key in [key for key in self.initial_counts if key[1] in bins]:
+            del self.initial_counts[key]
         self.records.archive(
             [*placed, *(each for each in phantoms if not (each.failed_pick_count or each.may_have_left))]
         )
@@ -204,36 +170,32 @@ class BinContents:
             if observed.is_confident and name and self.bins[name].contains(observed.position, BIN_THICKNESS)
         )
 
-    def record_contents(self, detections: Detections, bin_names: BinNameByObservation) -> list[str]:
-        """Record what a full image shows in the bins; return sentences on certain foreign objects.
+    def record_initial_contents(self, bin_names: BinNameByObservation) -> None:
+        """Record what a full image shows in the bins, unless the robot has picked an item before."""
+        if not self.records.archived and not self.records.filter_by_state(*OFF_TABLE):
+            visible_counts = self.count_visible_objects(bin_names)
+            self.initial_counts.update(visible_counts - self.initial_counts)
+
+    def find_foreign_objects(self, bin_names: BinNameByObservation) -> list[Region]:
+        """Return the objects that a full image shows in bins to which their class has no route.
 
         The bins of 56 runs contained 387 items at the last look, which showed 240 of these and no other
         object (`sort_overhead` 81 of 132, `sort_large` 136 of 184, `sort_wrist` 6 of 47, `sort_stacked` 17 of
-        24): an image proves what is in a bin, but not what is missing. As the detector repeats its errors,
-        several images must show a foreign object.
+        24): an image proves what is in a bin, but not what is missing.
         """
-        visible_counts = self.count_visible_objects(bin_names)
-        if not self.records.archived and not self.records.filter_by_state(*OFF_TABLE):
-            self.initial_counts.update(visible_counts - self.initial_counts)
-        detected_labels = {label: entry.detected_label for label, entry in self.classes.items()}
-        belonging = {
-            (detected_labels.get(label, label), name)
-            for label, names in self.routes.items()
-            for name in names
-        }
-        for key in self.foreign_objects.keys() | (visible_counts.keys() - belonging):
-            label, name = key
-            foreign_object = self.foreign_objects.setdefault(key, ForeignObject())
-            foreign_object.look_count += 1
-            if visible_counts[key] > self.count_placed(label, name):
-                foreign_object.hit_count += 1
-            elif self.is_floor_visible(name, detections):
-                foreign_object.miss_count += 1
-        return [
-            f"images show a {label} in {name}, in which no {label} belongs, and which received none"
-            for (label, name), foreign_object in sorted(self.foreign_objects.items())
-            if foreign_object.is_certain
-        ]
+        known_counts = Counter((item.detected_label, item.bin) for item in self.records.all if item.bin)
+        regions = []
+        for observed, name in bin_names.items():
+            label = observed.detection.label
+            labels = {label, *(each.label for each in self.classes.values() if each.looks_like == label)}
+            is_routed = any(name in self.routes.get(each, ()) for each in labels)
+            if is_routed or not name or not observed.is_confident:
+                continue
+            known_counts[label, name] -= 1
+            if known_counts[label, name] < 0:
+                text = f"a {label} is in {name}, in which no {label} belongs, and which received none"
+                regions.append(Region(observed.detection.box, observed.position, text))
+        return regions
 
     def find_item_left_behind(self, placed: ItemRecord) -> ItemRecord | None:
         """Return the item that looks showed at the place of a placed item after its pick, or None.

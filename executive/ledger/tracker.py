@@ -96,6 +96,8 @@ class Tracker:
         """True if an object was weighed whose class the looks prove."""
         self.false_grasp_count = 0
         self.unexplained = Unexplained(self.emit)
+        self._foreign_objects: list[Region] = []
+        """Objects that the last full image showed in bins in which their class does not belong."""
         self.assumption_reasons: list[str] = []
 
     def observe(self, detections: Detections, observations: Sequence[Observation]) -> Sequence[Target]:
@@ -128,10 +130,11 @@ class Tracker:
     def observe_regions(self, look: Detections, regions: Sequence[Region]) -> None:
         change_count = look.frame.change_count
         unmoved = [each for each in regions if self._coverage.is_unchanged(each.position, change_count)]
-        self.unexplained.observe(look, unmoved, self.config.gate * AMBIGUITY_FACTOR)
+        all_regions = (*unmoved, *self._foreign_objects)
+        self.unexplained.observe(look, all_regions, self.config.gate * AMBIGUITY_FACTOR)
 
     def choose_place_to_probe(self) -> Array | None:
-        return self.unexplained.choose_place_to_probe()
+        return self.unexplained.choose_place_to_probe(self.bins.values())
 
     def record_probe(self, place: Array, height: float | None) -> None:
         self.unexplained.record_probe(place, height)
@@ -404,8 +407,7 @@ class Tracker:
         labels = {entry for entry in routed_labels if not self._bin_contents.explain_skipped_class(entry)}
         if routed_labels and not labels:
             return True
-        needs_look = any(each.needs_look for each in self._bin_contents.foreign_objects.values())
-        if needs_look or self._coverage.max_object_probability > self.config.max_miss_probability:
+        if self._coverage.max_object_probability > self.config.max_miss_probability:
             return False
         if self.unexplained.needs_look:
             return False
@@ -484,8 +486,8 @@ class Tracker:
             self._records.emit(record)
         self._return_items_that_were_not_picked()
         if detections.view == "full":
-            for text in self._bin_contents.record_contents(detections, bin_names):
-                self.unexplained.report(text, text, frame=detections.frame.id)
+            self._bin_contents.record_initial_contents(bin_names)
+            self._foreign_objects = self._bin_contents.find_foreign_objects(bin_names)
             self._bin_contents.confirm_placed_items(detections, observations)
             self._bin_contents.mark_dropped_items_as_placed(detections, bin_names)
 

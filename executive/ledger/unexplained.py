@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from executive.cell.frame import Detections, Region
 from executive.cell.json_values import round_values
+from executive.cell.objects import Bin
 from executive.events import Emit, UnexplainedChanged
 from executive.geometry import Array
 
@@ -68,12 +69,18 @@ class Unexplained:
             if entry.position is not None and entry.touch_height is None
         )
 
-    def choose_place_to_probe(self) -> Array | None:
-        """Return the position `(3,)` [m] of a region that two looks showed, once for each, or None."""
+    def choose_place_to_probe(self, bins: Collection[Bin]) -> Array | None:
+        """Return the position `(3,)` [m] of a region outside of bins that two looks showed, or None.
+
+        Each region is chosen at most once.
+        """
         for entry in self._entries.values():
-            if entry.look_count >= 2 and not entry.is_probed:
+            position = entry.position
+            if position is None or entry.is_probed or entry.look_count < 2:
+                continue
+            if not any(bin.contains(position) for bin in bins):
                 entry.is_probed = True
-                return entry.position
+                return position
         return None
 
     def record_probe(self, place: Array, height: float | None) -> None:

@@ -87,7 +87,10 @@ class Bench:
                 *(self._observe(frame, by, thing, 0.9) for thing in things),
             ],
         )
-        return self.ledger.observe(*self.last_look)
+        targets = self.ledger.observe(*self.last_look)
+        if view == "full":
+            self.ledger.observe_regions(self.last_look[0], ())
+        return targets
 
     def verify(self, item: str, *things: Thing, **options: Any) -> str:
         """Look at the whole image, and return whether an item is at its place."""
