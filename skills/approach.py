@@ -87,8 +87,8 @@ class Approach(Skill):
         if not is_touching and grasp.guard == "touch":
             cell.ledger.record_failed_pick(item, found_table=grasp.proves_absence)
             message = f"no contact down to {height * 1000:.0f} mm, {item} {expectation}"
-            if not cell.ledger.is_contact_sensor_plausible():
-                raise self.failure("implausible", f"{message}; the contact sensor has never felt one")
+            if not cell.ledger.is_tool_plausible:
+                raise self.failure("implausible", f"{message}, and no pick has succeeded; check the sensor")
             raise self.failure("no_contact", message)
         if is_touching and (grasp.guard == "clear" or height > start_height + EARLY_CONTACT_MARGIN):
             cell.ledger.invalidate_positions()

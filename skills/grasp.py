@@ -47,6 +47,9 @@ class Grasp(Skill):
         if not is_holding:
             cell.ledger.record_failed_pick(self.target.item)
             message = f"no {noun} on {self.target.item} {self.settle:.2f} s after contact"
+            if not cell.ledger.is_tool_plausible:
+                message = f"{message}, and no pick has succeeded; check the tool and its sensor"
+                raise self.failure("sensor_implausible", message)
             raise self.failure("missed", message)
         cell.ledger.record_grasp(self.target.item)
         self.held = self.target.item

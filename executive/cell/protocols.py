@@ -179,8 +179,9 @@ class Ledger(Protocol):
             observations: The same detections, localized in the world.
         """
 
-    def is_contact_sensor_plausible(self) -> bool:
-        """Return False after several failed picks if the tool has never touched an item."""
+    @property
+    def is_tool_plausible(self) -> bool:
+        """False after several failed picks if none has succeeded: a sensor of the tool may be broken."""
 
     def record_empty_load(self, load: float) -> None:
         """Record the load of the empty tool at rest [N]."""

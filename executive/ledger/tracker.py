@@ -31,8 +31,8 @@ the attempts of the library, so that an obstacle that is no longer there costs n
 MAX_BODY_WIDTH = 0.5
 """Maximum width of the box of an ignored object, as a fraction of the searched region's width; a wider box
 shows the table or a tray, on which the objects lie."""
-MIN_FAILED_PICKS_WITHOUT_CONTACT = 8
-"""Number of failed picks, more than the attempts for one item, after which the tool must have felt one."""
+MIN_FAILED_PICKS_OF_BROKEN_TOOL = 8
+"""Number of failed picks, more than the attempts for one item, after which one must have succeeded."""
 MIN_LOOKS_WITHOUT_CLASS = 3
 """Minimum number of looks that show an item of no class before the table counts as searched."""
 
@@ -95,6 +95,7 @@ class Tracker:
         self._is_load_cell_checked = False
         """True if an object was weighed whose class the looks prove."""
         self.false_grasp_count = 0
+        self._has_grasped = False
         self.unexplained = Unexplained(self.emit)
         self._foreign_objects: list[Region] = []
         """Objects that the last full image showed in bins in which their class does not belong."""
@@ -166,9 +167,9 @@ class Tracker:
         self._records.emit(record)
         return Presence.GONE
 
-    def is_contact_sensor_plausible(self) -> bool:
-        has_few_failures = len(self._records.failed_picks) < MIN_FAILED_PICKS_WITHOUT_CONTACT
-        return has_few_failures or any(record.had_contact for record in self._records.all)
+    @property
+    def is_tool_plausible(self) -> bool:
+        return self._has_grasped or len(self._records.failed_picks) < MIN_FAILED_PICKS_OF_BROKEN_TOOL
 
     def record_empty_load(self, load: float) -> None:
         shift = load - self.empty_load
@@ -226,6 +227,7 @@ class Tracker:
                 "must call record_placement, record_drop or record_put_down of the ledger"
             )
         record = self._records.find(item)
+        self._has_grasped = True
         self._records.change_state(record, State.HELD)
         record.belief.is_confirmed = True
         record.was_taken_away = False
