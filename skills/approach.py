@@ -29,11 +29,11 @@ class Approach(Skill):
 
     The tool may measure the object at the contact, for instance its height. A measurement may contradict the
     class of the target, unless an earlier measurement agreed with the class; the skill then fails with
-    `contradicted`. The first measurement that may be wrong is no contradiction if the detections alone prove
-    the class. A contact at which the tool cannot grip the object, for instance below its centre or more than
-    `overtravel` below its top, is a miss; the skill then fails with `no_contact`. It also does at a contact
-    during the fast motion, whose height cannot be measured; the next approach is slow. It fails with
-    `implausible` if the contact sensor feels nothing in all approaches, or something high above the table.
+    `contradicted`. A contact at which the tool cannot grip the object, for instance below its centre or more
+    than `overtravel` below its top, is a miss; the skill then fails with `no_contact`. It also does at a
+    contact during the fast motion, whose height cannot be measured; the next approach is slow. It fails with
+    `implausible` if no pick of the run succeeds, or if the contact sensor feels something high above the
+    table.
     """
 
     target: In[Target] = port(doc="the target to touch")

@@ -153,6 +153,9 @@ class Ledger(Protocol):
     def has_unconfirmed_bin(self) -> bool:
         """Return True if no image has shown one of the bins as declared, or as contradicted, so far."""
 
+    def record_bin_contents(self, contents: Mapping[str, tuple[float, bool]], frame: Frame) -> None:
+        """Record the result of `Camera.measure_bins`: it changes only if the robot brings an object."""
+
     def record_bins(self, contradictions: Mapping[str, str], frame: Frame) -> None:
         """Record the result of `Camera.check_bins`; it replaces earlier results for the same bins."""
 
@@ -343,6 +346,13 @@ class Camera(Protocol):
         """Return the regions of a frame that neither the table nor anything known explains.
 
         Known are the arm, the bins, the detections and `obstacles`, the known objects on the table.
+        """
+
+    def measure_bins(self, frame: Frame) -> Mapping[str, tuple[float, bool]]:
+        """Return what a frame shows on the floors of the bins, by name.
+
+        The values are the area [m²] that differs from the floor, and True if the whole floor is in view.
+        A bin of which too little is in view is missing in the result.
         """
 
     def describe_displacement(self, frame: Frame) -> str:

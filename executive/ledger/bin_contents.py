@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from executive.cell.config import LedgerConfig
-from executive.cell.frame import Detections, ErrorRates, Observation, Region
+from executive.cell.frame import Detections, ErrorRates, Observation
 from executive.cell.objects import BIN_THICKNESS, Bin, ObjectClass, Quotas, is_quota_reached
 from executive.cell.protocols import Presence, Routes
 from executive.geometry import Array
@@ -27,6 +27,8 @@ LOG_ODDS_FELL_IN_BIN = math.log(0.95 / 0.05)
 """Prior log odds that a dropped item lies in the bin over which it was predicted to land."""
 BIN_AREA_FRACTION = 0.04
 """Fraction of an image that a bin covers: probability that a false detection lies in the bin."""
+MIN_CHANGED_FRACTION = 0.5
+"""Minimum change of the visible area in a bin, as a fraction of the area of the smallest class."""
 MIN_LOOKS_AT_ITEM_LEFT_BEHIND = 2
 """Minimum number of looks that prove an item at a place from which another item was picked."""
 OFF_TABLE = (State.HELD, State.DROPPED, State.PLACED)
@@ -36,6 +38,21 @@ FLOOR_POINTS = np.array([(0, 0, 0), (1, 1, 0), (1, -1, 0), (-1, 1, 0), (-1, -1, 
 
 BinNameByObservation = Mapping[Observation, str | None]
 """Name of the bin in which each observed object lies, or None."""
+
+
+@dataclass(eq=False)
+class BinView:
+    """What images show in a bin since the robot last brought an object.
+
+    Attributes:
+        item_count: Number of objects in the bin according to the ledger.
+        area: Area that differs from the floor [m²]; 0 for an empty bin, None before the first image.
+        is_doubtful: True if the last image showed another area.
+    """
+
+    item_count: int
+    area: float | None
+    is_doubtful: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +69,7 @@ class BinContents:
         classes: Classes of the cell by label.
         initial_counts: Maximum number of objects that full images showed before the first pick, by detected
             class and bin.
+        views: What images show, by name of the bin.
     """
 
     config: LedgerConfig
@@ -62,6 +80,7 @@ class BinContents:
     classes: Mapping[str, ObjectClass]
     contradictions: dict[str, str] = field(default_factory=dict)
     initial_counts: Counter[tuple[str, str]] = field(default_factory=Counter)
+    views: dict[str, BinView] = field(default_factory=dict)
 
     def count_objects_in(self, bin_name: str, label: str | None = None) -> int:
         """Return the number of items that were released in a bin or have probably fallen into the bin.
@@ -176,26 +195,40 @@ class BinContents:
             visible_counts = self.count_visible_objects(bin_names)
             self.initial_counts.update(visible_counts - self.initial_counts)
 
-    def find_foreign_objects(self, bin_names: BinNameByObservation) -> list[Region]:
-        """Return the objects that a full image shows in bins to which their class has no route.
+    @property
+    def needs_look(self) -> bool:
+        """True if one image showed other contents of a bin than before, and the next one may confirm it."""
+        return any(view.is_doubtful for view in self.views.values())
 
-        The bins of 56 runs contained 387 items at the last look, which showed 240 of these and no other
-        object (`sort_overhead` 81 of 132, `sort_large` 136 of 184, `sort_wrist` 6 of 47, `sort_stacked` 17 of
-        24): an image proves what is in a bin, but not what is missing.
+    def compare_contents(self, contents: Mapping[str, tuple[float, bool]]) -> dict[str, str]:
+        """Return sentences on bins whose contents two images show changed, although the robot did not act.
+
+        The sentences are by name of the bin, `contents` as in `Camera.measure_bins`. While the position of an
+        item is unknown, it may be in any bin.
         """
-        known_counts = Counter((item.detected_label, item.bin) for item in self.records.all if item.bin)
-        regions = []
-        for observed, name in bin_names.items():
-            label = observed.detection.label
-            labels = {label, *(each.label for each in self.classes.values() if each.looks_like == label)}
-            is_routed = any(name in self.routes.get(each, ()) for each in labels)
-            if is_routed or not name or not observed.is_confident:
+        changes = {}
+        # An object hidden at a wall may show a part of its area only.
+        min_area = MIN_CHANGED_FRACTION * math.pi * min(each.radius for each in self.classes.values()) ** 2
+        if self.records.filter_by_state(State.DROPPED):
+            self.views.clear()
+            return {}
+        for name, (area, is_whole) in contents.items():
+            item_count = self.count_objects_in(name)
+            view = self.views.get(name)
+            if view is None or view.item_count != item_count:
+                self.views[name] = BinView(item_count, None if item_count else 0.0)
+                # Objects may still roll in the first image after a release.
                 continue
-            known_counts[label, name] -= 1
-            if known_counts[label, name] < 0:
-                text = f"a {label} is in {name}, in which no {label} belongs, and which received none"
-                regions.append(Region(observed.detection.box, observed.position, text))
-        return regions
+            if view.area is None and is_whole:
+                view.area = area
+            if view.area is None or not (is_whole or item_count == 0):
+                continue
+            is_changed = abs(area - view.area) >= min_area if is_whole else area >= min_area
+            if is_changed and view.is_doubtful:
+                verb = "came into" if area > view.area else "left"
+                changes[name] = f"something {verb} {name}, and the robot did not do it"
+            view.is_doubtful = is_changed
+        return changes
 
     def find_item_left_behind(self, placed: ItemRecord) -> ItemRecord | None:
         """Return the item that looks showed at the place of a placed item after its pick, or None.

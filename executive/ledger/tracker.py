@@ -97,8 +97,6 @@ class Tracker:
         self.false_grasp_count = 0
         self._has_grasped = False
         self.unexplained = Unexplained(self.emit)
-        self._foreign_objects: list[Region] = []
-        """Objects that the last full image showed in bins in which their class does not belong."""
         self.assumption_reasons: list[str] = []
 
     def observe(self, detections: Detections, observations: Sequence[Observation]) -> Sequence[Target]:
@@ -131,11 +129,10 @@ class Tracker:
     def observe_regions(self, look: Detections, regions: Sequence[Region]) -> None:
         change_count = look.frame.change_count
         unmoved = [each for each in regions if self._coverage.is_unchanged(each.position, change_count)]
-        all_regions = (*unmoved, *self._foreign_objects)
-        self.unexplained.observe(look, all_regions, self.config.gate * AMBIGUITY_FACTOR)
+        self.unexplained.observe(look, unmoved, self.config.gate * AMBIGUITY_FACTOR)
 
     def choose_place_to_probe(self) -> Array | None:
-        return self.unexplained.choose_place_to_probe(self.bins.values())
+        return self.unexplained.choose_place_to_probe()
 
     def record_probe(self, place: Array, height: float | None) -> None:
         self.unexplained.record_probe(place, height)
@@ -304,6 +301,10 @@ class Tracker:
         self._bin_contents.archive_items(bins)
         self.emit(BinsEmptied(list(bins)))
 
+    def record_bin_contents(self, contents: Mapping[str, tuple[float, bool]], frame: Frame) -> None:
+        for name, text in self._bin_contents.compare_contents(contents).items():
+            self.unexplained.report(f"contents {name}", text, frame=frame.id)
+
     def record_bins(self, contradictions: Mapping[str, str], frame: Frame) -> None:
         self._bin_contents.contradictions.update(contradictions)
         for name, contradiction in contradictions.items():
@@ -411,7 +412,7 @@ class Tracker:
             return True
         if self._coverage.max_object_probability > self.config.max_miss_probability:
             return False
-        if self.unexplained.needs_look:
+        if self.unexplained.needs_look or self._bin_contents.needs_look:
             return False
         records = (record for record in self._records.all if record.item not in ignored_items)
         possible_items = [record for record in records if self._certainty.may_be_on_table(record)]
@@ -489,7 +490,6 @@ class Tracker:
         self._return_items_that_were_not_picked()
         if detections.view == "full":
             self._bin_contents.record_initial_contents(bin_names)
-            self._foreign_objects = self._bin_contents.find_foreign_objects(bin_names)
             self._bin_contents.confirm_placed_items(detections, observations)
             self._bin_contents.mark_dropped_items_as_placed(detections, bin_names)
 

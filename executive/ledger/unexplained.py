@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from executive.cell.frame import Detections, Region
 from executive.cell.json_values import round_values
-from executive.cell.objects import Bin
 from executive.events import Emit, UnexplainedChanged
 from executive.geometry import Array
 
@@ -69,18 +68,12 @@ class Unexplained:
             if entry.position is not None and entry.touch_height is None
         )
 
-    def choose_place_to_probe(self, bins: Collection[Bin]) -> Array | None:
-        """Return the position `(3,)` [m] of a region outside of bins that two looks showed, or None.
-
-        Each region is chosen at most once.
-        """
+    def choose_place_to_probe(self) -> Array | None:
+        """Return the position `(3,)` [m] of a region that two looks showed, at most once, or None."""
         for entry in self._entries.values():
-            position = entry.position
-            if position is None or entry.is_probed or entry.look_count < 2:
-                continue
-            if not any(bin.contains(position) for bin in bins):
+            if entry.look_count >= 2 and not entry.is_probed:
                 entry.is_probed = True
-                return position
+                return entry.position
         return None
 
     def record_probe(self, place: Array, height: float | None) -> None:

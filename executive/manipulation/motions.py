@@ -56,6 +56,7 @@ def capture_and_detect(cell: Cell, detector: str, view: str) -> Generator[None, 
         yield
     if view == "full" or cell.ledger.has_unconfirmed_bin():
         cell.ledger.record_bins(cell.camera.check_bins(frame), frame)
+    cell.ledger.record_bin_contents(cell.camera.measure_bins(frame), frame)
     while not request.ready:
         yield
     try:

@@ -16,7 +16,7 @@ from executive.cell.frame import Frame
 from executive.cell.objects import BIN_THICKNESS, Bin
 from executive.geometry import Array
 from executive.perception.camera_check import OutlineFitter, compute_bin_mask, smooth_image
-from executive.perception.camera_model import project
+from executive.perception.camera_model import compute_hull_mask, project
 
 MIN_SUPPORT = 0.65
 """Minimum support of a bin at its place (`OutlineFitter.compute_bin_supports`), in both directions."""
@@ -52,6 +52,18 @@ CANNY_THRESHOLDS = (15, 40)
 """Thresholds of the edge detector for the search."""
 RIM_FRACTIONS = np.linspace(-1.0, 1.0, 15)
 """Positions of the searched points on each side of a rim, in units of half the side."""
+REDUCTION = 2
+"""Factor that reduces the size of the image for the measurement of contents."""
+FLOOR_MARGIN = 0.008
+"""Distance of the measured part of a floor from the walls [m]."""
+MIN_CONTENT_CONTRAST = 14.0
+"""Minimum deviation of an object in a bin from the colour of the floor [grey level]."""
+MIN_SHOWN_FRACTION = 0.5
+"""Minimum visible fraction of a floor whose contents are measured."""
+MIN_WHOLE_FRACTION = 0.7
+"""Minimum fraction of a floor that a camera sees through the opening, if nothing hides the bin."""
+MAX_COVERED_FRACTION = 0.5
+"""Maximum covered fraction of a floor, so that the median colour is that of the floor."""
 WHITE = 250
 """Minimum value of the channels of a white pixel."""
 GREY = np.full(3, 1 / 3)
@@ -91,6 +103,46 @@ def check_bins(frame: Frame, bins: Sequence[Bin]) -> dict[str, str]:
             verdicts[bin.name] = ""
     # A bin whose colour appears at the place of another one is probably elsewhere, too.
     return suspects | verdicts
+
+
+def measure_contents(frame: Frame, bins: Sequence[Bin]) -> dict[str, tuple[float, bool]]:
+    """Return the area [m²] that differs from the floor, and if the whole floor is in view, by bin.
+
+    A bin is missing in the result if too little of its floor is in view, or if objects cover most of it.
+    """
+    contents = {}
+    up = np.array([0.0, 0.0, 1.0])
+    size = (frame.visible.shape[1] // REDUCTION, frame.visible.shape[0] // REDUCTION)
+    matrix = frame.matrix.copy()
+    matrix[:2] /= REDUCTION
+    image = cv2.resize(frame.image, size, interpolation=cv2.INTER_AREA).astype(np.int16)
+    visible = cv2.resize(frame.visible.astype(np.uint8), size, interpolation=cv2.INTER_AREA) > 0
+    for bin in bins:
+        half_size = np.array([*(bin.size[:2] / 2 - FLOOR_MARGIN), 0.0])
+        rectangle = bin.position + half_size * [(1, 1, 0), (1, -1, 0), (-1, -1, 0), (-1, 1, 0)]
+        # The camera sees the floor through the opening of the bin.
+        masks = [
+            compute_hull_mask(rectangle + up * height, matrix, frame.X_WC, size, may_be_cut=True)
+            for height in (BIN_THICKNESS, bin.size[2])
+        ]
+        floor_mask = np.logical_and(*masks) if all(mask is not None for mask in masks) else None
+        if floor_mask is None or not floor_mask.any():
+            continue
+        left, top, width, height = cv2.boundingRect(floor_mask.astype(np.uint8))
+        crop = np.s_[top : top + height, left : left + width]
+        shown_mask = (floor_mask & visible)[crop]
+        scale = float(matrix[0, 0]) / frame.compute_depth(bin.position)
+        shown_fraction = shown_mask.sum() / (4 * half_size[0] * half_size[1] * scale**2)
+        colours = image[crop][shown_mask]
+        if shown_fraction < MIN_SHOWN_FRACTION:
+            continue
+        deviations = np.abs(image[crop] - np.median(colours, axis=0)).max(axis=2)
+        is_different = shown_mask & (deviations > MIN_CONTENT_CONTRAST)
+        opened = cv2.morphologyEx(is_different.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+        if opened.sum() < MAX_COVERED_FRACTION * len(colours):
+            is_whole = shown_mask.sum() == floor_mask.sum() and shown_fraction > MIN_WHOLE_FRACTION
+            contents[bin.name] = (round(float(opened.sum() / scale**2), 5), bool(is_whole))
+    return contents
 
 
 def _describe_place(frame: Frame, bin: Bin, bins: Sequence[Bin]) -> str:

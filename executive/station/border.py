@@ -222,6 +222,7 @@ METHODS: Mapping[str, Input] = {
     "camera.describe_displacement": Input("camera.displacement"),
     "camera.find_unexplained": Input("camera.regions", REGIONS),
     "camera.check_bins": Input("camera.bins"),
+    "camera.measure_bins": Input("camera.contents"),
     "detector.request": COMMAND,
     "request.result": Input("detector.{name}", ANSWER),
     "operator.ask": Input("operator"),

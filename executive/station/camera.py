@@ -21,7 +21,7 @@ from executive.cell.protocols import Tool
 from executive.errors import WrongImage
 from executive.geometry import Array, Pose
 from executive.motion.joints import Kinematics
-from executive.perception.bin_check import check_bins
+from executive.perception.bin_check import check_bins, measure_contents
 from executive.perception.camera_check import describe_displacement, describe_standstill
 from executive.perception.camera_model import BORDER_FRACTION, compute_calibration, compute_hull_mask
 from executive.perception.witness import find_unexplained
@@ -180,6 +180,10 @@ class CellCamera:
     def check_bins(self, frame: Frame) -> dict[str, str]:
         """Return "" for each bin that a frame shows as declared, and a sentence for others in view."""
         return check_bins(frame, self._bins) if self._is_hidden_by_arm else {}
+
+    def measure_bins(self, frame: Frame) -> dict[str, tuple[float, bool]]:
+        """Return what lies on the floors of the bins in view; nothing without physics."""
+        return measure_contents(frame, self._bins) if self._is_hidden_by_arm else {}
 
     def _compute_pose(self, q: Array) -> Pose:
         """Return the pose `X_WC` of the camera at joint positions `q` `(n,)` [rad]."""

@@ -31,9 +31,6 @@ ATTEMPTS_BEFORE_PROBE = 3
 """Number of failed attempts after which each approach is a probe."""
 GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
 """Angle between two successive points of a Vogel spiral [rad]."""
-OTHER_CLASS_TOLERANCE = 0.0025
-"""Maximum difference between the height of a touch and the height of another class to which the object may
-belong [m]."""
 
 
 class Suction(ToolModel):
@@ -110,27 +107,22 @@ class Suction(ToolModel):
         object_class: ObjectClass,
         position: Array,
         height: float,
-        classes: Mapping[str, ObjectClass],
+        classes: Mapping[str, ObjectClass],  # noqa: ARG002
         overtravel: float = OVERTRAVEL,
     ) -> ToolMeasurement:
         """Return the evidence of the height of a touch.
 
         A touch at a wrong height missed the top if it is below the centre of the object or more than
-        `overtravel` below its top. It may have hit the object below the top if it is too low for the assumed
-        class, and no class has this height.
+        `overtravel` below its top.
         """
-        errors = {label: _compute_height_error(other, height) for label, other in classes.items()}
-        error = errors[object_class.label]
-        if abs(error) <= self.touch_tolerance:
+        if min(abs(height - top) for top in object_class.top_heights) <= self.touch_tolerance:
             return ToolMeasurement()
         contradiction = (
             f"it was touched {height * 1000:.0f} mm above the table, and a {object_class.label} is "
             f"{object_class.height * 1000:.0f} mm high"
         )
         is_near_top = height >= _compute_min_contact_height(object_class, float(position[2]), overtravel)
-        fits_no_class = all(abs(other) > OTHER_CLASS_TOLERANCE for other in errors.values())
-        may_be_wrong = is_near_top and error < 0 and fits_no_class
-        return ToolMeasurement(contradiction, may_be_wrong, is_miss=not is_near_top)
+        return ToolMeasurement(contradiction, is_miss=not is_near_top)
 
     def find_distinct_labels(self, classes: Mapping[str, ObjectClass]) -> frozenset[str]:
         """Return the classes whose height differs by more than `touch_tolerance` from all others."""
@@ -158,11 +150,6 @@ def _compute_min_contact_height(object_class: ObjectClass, centre_height: float,
     The guarded motion continues below the expected surface by `overtravel` [m], at most to the centre.
     """
     return max(centre_height + object_class.height / 2 - overtravel, centre_height)
-
-
-def _compute_height_error(object_class: ObjectClass, height: float) -> float:
-    """Return `height` [m] minus the nearest possible height of the top of an object of a class."""
-    return min((height - top for top in object_class.top_heights), key=abs)
 
 
 RIM_RAY_COUNT = 16

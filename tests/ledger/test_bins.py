@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ledger_bench import Bench, Thing
+from ledger_bench import Bench, Thing, take_frame
 
+from executive.cell.objects import ObjectClass
 from executive.events import ItemChanged
 
 OVER = np.array([0.2, -0.44, 0.025])
@@ -105,17 +106,36 @@ def test_an_object_that_was_in_the_bin_at_the_start_is_not_the_dropped_one(bench
     assert bench.states()["cube-1"] == ("placed", "red_bin")
 
 
+@pytest.fixture
+def boxes() -> Bench:
+    """A ledger that knows the size of the cubes."""
+    return Bench({"cube": ObjectClass("cube", 0.05, 0.0354)})
+
+
 @pytest.mark.parametrize(
-    ("label", "shown_count", "is_named"), [("duck", 3, True), ("duck", 1, False), ("cube", 3, False)]
+    ("areas", "text"),
+    [
+        ([0.0, 0.003, 0.0], ""),
+        ([0.0, 0.003, 0.003], "something came into red_bin, and the robot did not do it"),
+    ],
 )
-def test_looks_name_an_object_in_a_bin_where_its_class_does_not_belong(
-    bench: Bench, label: str, shown_count: int, is_named: bool
+def test_two_images_name_an_object_in_a_bin_that_the_robot_did_not_bring(
+    boxes: Bench, areas: list[float], text: str
 ) -> None:
-    for number in range(4):
-        bench.look(*[(label, 0.2, -0.44)] * (number < shown_count), view="full")
-        assert not (bench.ledger.is_table_empty() and label == "duck" and number + 1 < shown_count)
-    texts = [event.text.split(",")[0] for event in bench.ledger.unexplained.events]
-    assert texts == ["a duck is in red_bin"] * is_named
+    for area in areas:
+        boxes.ledger.record_bin_contents({"red_bin": (area, False)}, take_frame())
+    assert [event.text for event in boxes.ledger.unexplained.events] == [text] * bool(text)
+
+
+def test_a_bin_keeps_the_objects_that_the_robot_brought(boxes: Bench) -> None:
+    boxes.look(CUBE, view="full")
+    boxes.place("cube-1")
+    for area in (0.001, 0.003, 0.0028, 0.0, 0.0028, 0.0):
+        boxes.ledger.record_bin_contents({"red_bin": (area, True)}, take_frame())
+    assert not boxes.ledger.unexplained.events
+    boxes.ledger.record_bin_contents({"red_bin": (0.0, True)}, take_frame())
+    (event,) = boxes.ledger.unexplained.events
+    assert event.text == "something left red_bin, and the robot did not do it"
 
 
 @pytest.mark.parametrize("between", [[], [()]], ids=["seen at once", "appeared later"])

@@ -13,7 +13,7 @@ from executive.cell.config import BinConfig
 from executive.cell.frame import Frame
 from executive.cell.objects import BIN_THICKNESS, Bin
 from executive.geometry import Array, Pose
-from executive.perception.bin_check import check_bins
+from executive.perception.bin_check import check_bins, measure_contents
 from executive.perception.camera_check import (
     MAX_OUTLINE_DISTANCE,
     describe_displacement,
@@ -174,3 +174,14 @@ def test_a_camera_is_frozen_if_its_image_does_not_change_where_the_arm_moved(
     second = replace(first, id=2, stamp=0.5, image=noisy, visible=visible)
     text = describe_standstill(second, first)
     assert problem in text if problem else text == ""
+
+
+def test_an_object_on_the_floor_of_a_bin_in_view_is_measured() -> None:
+    frame = draw(DECLARED)
+    assert set(measure_contents(frame, DECLARED_BINS).values()) == {(0.0, True)}
+    column, row = project(MATRIX, DECLARED, [PLACES["red"]])[0].astype(int)
+    frame.image[row - 10 : row + 10, column - 10 : column + 10] = 20
+    area, is_whole = measure_contents(frame, DECLARED_BINS)["red"]
+    assert (area, is_whole) == (pytest.approx((20 * 1.2 / MATRIX[0, 0]) ** 2, rel=0.15), True)
+    frame.visible[row + 20 :] = False
+    assert not measure_contents(frame, DECLARED_BINS)["red"][1]

@@ -29,12 +29,12 @@ def carry(fake: FakeCell, item: str) -> None:
     run_skill(Release(held=item, bin="red_bin"), fake)
 
 
-@pytest.mark.parametrize(("lower", "height"), [(0.0, 0.05), (0.01, 0.04)])
+@pytest.mark.parametrize(("lower", "height", "reason"), [(0.0, 0.05, ""), (0.01, 0.04, "contradicted")])
 def test_approach_ends_on_the_surface_that_it_feels(
-    fake: FakeCell, target: Target, lower: float, height: float
+    fake: FakeCell, target: Target, lower: float, height: float, reason: str
 ) -> None:
     fake.world.objects[0].position[2] -= lower
-    assert run_skill(Approach(target=target), fake).status == "SUCCESS"
+    assert run_skill(Approach(target=target), fake).reason == reason
     assert fake.tool.touching
     assert fake.arm.tool_pose.position[2] == pytest.approx(height, abs=0.002)
 
