@@ -31,8 +31,6 @@ MIN_CHANGED_FRACTION = 0.5
 """Minimum change of the visible area in a bin, as a fraction of the area of the smallest class."""
 MIN_LOOKS_AT_ITEM_LEFT_BEHIND = 2
 """Minimum number of looks that prove an item at a place from which another item was picked."""
-OFF_TABLE = (State.HELD, State.DROPPED, State.PLACED)
-"""States of items that the robot has picked, or that have left the table."""
 FLOOR_POINTS = np.array([(0, 0, 0), (1, 1, 0), (1, -1, 0), (-1, 1, 0), (-1, -1, 0)])
 """Points of a bin's floor that must be visible, in units of half its length and half its width `(5, 3)`."""
 
@@ -55,7 +53,7 @@ class BinView:
     is_doubtful: bool = False
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class BinContents:
     """Bins of the cell, and estimates of the items in them.
 
@@ -67,8 +65,9 @@ class BinContents:
         quotas: Maximum numbers of objects in the bins.
         contradictions: What the last image of a bin shows, by name of the bin: "" if the bin is as declared.
         classes: Classes of the cell by label.
-        initial_counts: Maximum number of objects that full images showed before the first pick, by detected
-            class and bin.
+        surplus_counts: Maximum number of objects that full images showed beside the items, by detected class
+            and bin.
+        known_bins: Names of the bins whose contents images showed before an item was dropped.
         views: What images show, by name of the bin.
     """
 
@@ -79,7 +78,8 @@ class BinContents:
     quotas: Quotas
     classes: Mapping[str, ObjectClass]
     contradictions: dict[str, str] = field(default_factory=dict)
-    initial_counts: Counter[tuple[str, str]] = field(default_factory=Counter)
+    surplus_counts: Counter[tuple[str, str]] = field(default_factory=Counter)
+    known_bins: set[str] = field(default_factory=set)
     views: dict[str, BinView] = field(default_factory=dict)
 
     def count_objects_in(self, bin_name: str, label: str | None = None) -> int:
@@ -99,8 +99,8 @@ class BinContents:
         placed = [each for each in self.records.filter_by_state(State.PLACED) if each.bin in bins]
         phantoms = self.records.filter_by_state(State.PHANTOM)
         # A phantom after a failed pick may be an object that the pick pushed away.
-        for key in [key for key in self.initial_counts if key[1] in bins]:
-            del self.initial_counts[key]
+        for key in [key for key in self.surplus_counts if key[1] in bins]:
+            del self.surplus_counts[key]
         self.records.archive(
             [*placed, *(each for each in phantoms if not (each.failed_pick_count or each.may_have_left))]
         )
@@ -170,8 +170,9 @@ class BinContents:
         for record in self.records.filter_by_state(State.DROPPED):
             for bin_name in self.routes.get(record.label, ()):
                 label = record.detected_label
-                known_count = self.count_placed(label, bin_name) + self.initial_counts[label, bin_name]
-                has_additional_object = visible_counts[label, bin_name] > known_count
+                known_count = self.count_placed(label, bin_name) + self.surplus_counts[label, bin_name]
+                is_known = bin_name in self.known_bins
+                has_additional_object = is_known and visible_counts[label, bin_name] > known_count
                 if has_additional_object or self.is_floor_visible(bin_name, detections):
                     update_bin_log_odds(record, bin_name, rates, has_additional_object=has_additional_object)
                 if record.bin_log_odds[bin_name] >= -math.log(self.config.max_miss_probability):
@@ -189,11 +190,13 @@ class BinContents:
             if observed.is_confident and name and self.bins[name].contains(observed.position, BIN_THICKNESS)
         )
 
-    def record_initial_contents(self, bin_names: BinNameByObservation) -> None:
-        """Record what a full image shows in the bins, unless the robot has picked an item before."""
-        if not self.records.archived and not self.records.filter_by_state(*OFF_TABLE):
-            visible_counts = self.count_visible_objects(bin_names)
-            self.initial_counts.update(visible_counts - self.initial_counts)
+    def record_surplus(self, detections: Detections, bin_names: BinNameByObservation) -> None:
+        """Record the objects in bins in a full image that no item explains, unless an item was dropped."""
+        if self.records.filter_by_state(State.DROPPED):
+            return
+        for key, count in self.count_visible_objects(bin_names).items():
+            self.surplus_counts[key] = max(self.surplus_counts[key], count - self.count_placed(*key))
+        self.known_bins.update(name for name in self.bins if self.is_floor_visible(name, detections))
 
     @property
     def needs_look(self) -> bool:
@@ -210,7 +213,7 @@ class BinContents:
         # An object hidden at a wall may show a part of its area only.
         min_area = MIN_CHANGED_FRACTION * math.pi * min(each.radius for each in self.classes.values()) ** 2
         if self.records.filter_by_state(State.DROPPED):
-            self.views.clear()
+            self.views = {name: BinView(view.item_count, None) for name, view in self.views.items()}
             return {}
         for name, (area, is_whole) in contents.items():
             item_count = self.count_objects_in(name)
@@ -221,6 +224,8 @@ class BinContents:
                 continue
             if view.area is None and is_whole:
                 view.area = area
+            if is_whole and item_count == 0 and area < min_area:
+                self.known_bins.add(name)
             if view.area is None or not (is_whole or item_count == 0):
                 continue
             is_changed = abs(area - view.area) >= min_area if is_whole else area >= min_area

@@ -314,9 +314,12 @@ class Tracker:
                 self.unexplained.withdraw(f"bin {name}")
 
     def set_final_states(self, *, completed: bool) -> None:
+        if unseen_bins := [name for name in self.bins if name not in self._bin_contents.views]:
+            self.assumption_reasons.append(f"no image showed what is in {', '.join(unseen_bins)}")
         was_weighed = any(record.belief.weight_log_ratios for record in self._records.all)
         if was_weighed and not self._is_load_cell_checked:
-            self.assumption_reasons.append("the load cell has the right gain: no known object proved it")
+            text = "nothing proved the load cell: the run weighed no object whose class the looks alone prove"
+            self.unexplained.report("load cell", text)
         has_confirmed_item = any(self._confirmed_labels)
         dropped = self._records.filter_by_state(State.DROPPED)
         dropped_items = [record for record in dropped if not record.was_taken_away]
@@ -489,7 +492,7 @@ class Tracker:
             self._records.emit(record)
         self._return_items_that_were_not_picked()
         if detections.view == "full":
-            self._bin_contents.record_initial_contents(bin_names)
+            self._bin_contents.record_surplus(detections, bin_names)
             self._bin_contents.confirm_placed_items(detections, observations)
             self._bin_contents.mark_dropped_items_as_placed(detections, bin_names)
 

@@ -32,7 +32,7 @@ LOST = ("lost", "known to exist, not found again")
 def test_what_came_down_in_its_bin_is_there_though_no_look_shows_it(
     bench: Bench, landing: np.ndarray | None, final: tuple[str, str]
 ) -> None:
-    bench.look(CUBE)
+    bench.look(CUBE, view="full")
     bench.drop("cube-1", landing)
     for _ in range(3):
         bench.look()
@@ -45,7 +45,7 @@ def test_what_came_down_in_its_bin_is_there_though_no_look_shows_it(
 def test_what_must_have_fallen_into_a_bin_takes_a_place_there_until_a_look_shows_otherwise(
     bench: Bench,
 ) -> None:
-    bench.look(CUBE)
+    bench.look(CUBE, view="full")
     bench.drop("cube-1", OVER)
     assert bench.ledger.count_objects_in("red_bin") == 1
     bench.look(view="full")
@@ -62,7 +62,7 @@ def test_what_must_have_fallen_into_a_bin_takes_a_place_there_until_a_look_shows
 def test_what_leans_on_the_wall_of_its_bin_is_in_it_and_what_lies_beside_it_is_no_target(
     bench: Bench, y: float, placed: int
 ) -> None:
-    bench.look(CUBE, ("cube", 0.6, 0.1))
+    bench.look(CUBE, ("cube", 0.6, 0.1), view="full")
     bench.place("cube-1")
     bench.drop("cube-2")
     assert bench.look(("cube", 0.2, y), IN_RED, view="full") == []
@@ -70,7 +70,7 @@ def test_what_leans_on_the_wall_of_its_bin_is_in_it_and_what_lies_beside_it_is_n
 
 
 def test_what_was_given_up_is_found_in_its_bin_all_the_same(bench: Bench) -> None:
-    bench.look(CUBE)
+    bench.look(CUBE, view="full")
     bench.drop("cube-1")
     assert bench.ledger.describe("cube-1").state == "lost"
     bench.ledger.reject("cube-1", "12 attempts failed")
@@ -80,14 +80,14 @@ def test_what_was_given_up_is_found_in_its_bin_all_the_same(bench: Bench) -> Non
 
 
 def test_a_dropped_item_is_recognized_where_it_lies(bench: Bench) -> None:
-    bench.look(CUBE, ("cube", 0.6, 0.1))
+    bench.look(CUBE, ("cube", 0.6, 0.1), view="full")
     bench.drop("cube-1")
     found = bench.look(("cube", 0.6, 0.1), ("cube", 0.30, -0.3), view="full")
     assert [(t.item, t.position[0]) for t in found] == [("cube-1", 0.30), ("cube-2", pytest.approx(0.6))]
 
 
 def test_one_object_more_in_a_bin_of_its_class_than_was_let_go_there_is_the_dropped_one(bench: Bench) -> None:
-    bench.look(("cube", 0.45, 0.0))
+    bench.look(("cube", 0.45, 0.0), view="full")
     bench.place("cube-1")
     bench.look(("cube", 0.60, 0.0))
     bench.drop("cube-2")
@@ -140,7 +140,7 @@ def test_a_bin_keeps_the_objects_that_the_robot_brought(boxes: Bench) -> None:
 
 @pytest.mark.parametrize("between", [[], [()]], ids=["seen at once", "appeared later"])
 def test_an_item_that_looks_show_where_it_was_picked_is_not_in_the_bin(bench: Bench, between: list) -> None:
-    bench.look(CUBE)
+    bench.look(CUBE, view="full")
     bench.place("cube-1")
     for things in [*between, (CUBE,), (CUBE,)]:
         bench.look(*things)
@@ -158,7 +158,7 @@ def test_an_item_that_looks_show_where_it_was_picked_is_not_in_the_bin(bench: Be
 def test_a_dropped_item_is_placed_once_in_a_bin_of_its_class(
     bench: Bench, shown: list[Thing], placed: list[str]
 ) -> None:
-    bench.look(CUBE)
+    bench.look(CUBE, view="full")
     bench.drop("cube-1")
     assert bench.look(*shown, view="full") == []
     changes = [event for event in bench.events if isinstance(event, ItemChanged)]
@@ -167,7 +167,7 @@ def test_a_dropped_item_is_placed_once_in_a_bin_of_its_class(
 
 
 def test_the_items_of_an_emptied_bin_stay_placed_and_no_longer_count_in_it(bench: Bench) -> None:
-    bench.look(CUBE, ("cube", 0.6, 0.1))
+    bench.look(CUBE, ("cube", 0.6, 0.1), view="full")
     bench.place("cube-1")
     bench.drop("cube-2", OVER)
     ledger = bench.ledger
