@@ -45,12 +45,12 @@ class BinView:
     Attributes:
         item_count: Number of objects in the bin according to the ledger.
         area: Area that differs from the floor [m²]; 0 for an empty bin, None before the first image.
-        is_doubtful: True if the last image showed another area.
+        change: Sentence on the change of the area that the last image showed, or "".
     """
 
     item_count: int
     area: float | None
-    is_doubtful: bool = False
+    change: str = ""
 
 
 @dataclass(eq=False)
@@ -198,11 +198,6 @@ class BinContents:
             self.surplus_counts[key] = max(self.surplus_counts[key], count - self.count_placed(*key))
         self.known_bins.update(name for name in self.bins if self.is_floor_visible(name, detections))
 
-    @property
-    def needs_look(self) -> bool:
-        """True if one image showed other contents of a bin than before, and the next one may confirm it."""
-        return any(view.is_doubtful for view in self.views.values())
-
     def compare_contents(self, contents: Mapping[str, tuple[float, bool]]) -> dict[str, str]:
         """Return sentences on bins whose contents two images show changed, although the robot did not act.
 
@@ -219,20 +214,24 @@ class BinContents:
             item_count = self.count_objects_in(name)
             view = self.views.get(name)
             if view is None or view.item_count != item_count:
-                self.views[name] = BinView(item_count, None if item_count else 0.0)
-                # Objects may still roll in the first image after a release.
-                continue
+                view = self.views[name] = BinView(item_count, None if item_count else 0.0)
+                if item_count:
+                    # Objects may still roll in the first image after a release.
+                    continue
             if view.area is None and is_whole:
                 view.area = area
             if is_whole and item_count == 0 and area < min_area:
                 self.known_bins.add(name)
             if view.area is None or not (is_whole or item_count == 0):
                 continue
-            is_changed = abs(area - view.area) >= min_area if is_whole else area >= min_area
-            if is_changed and view.is_doubtful:
-                verb = "came into" if area > view.area else "left"
-                changes[name] = f"something {verb} {name}, and the robot did not do it"
-            view.is_doubtful = is_changed
+            # A partial view may show less than before.
+            is_changed = area - view.area >= min_area or (is_whole and view.area - area >= min_area)
+            if is_changed and view.change:
+                changes[name] = view.change
+                view.area = area
+                is_changed = False
+            verb = "came into" if area > view.area else "left"
+            view.change = f"something {verb} {name}, and the robot did not do it" if is_changed else ""
         return changes
 
     def find_item_left_behind(self, placed: ItemRecord) -> ItemRecord | None:

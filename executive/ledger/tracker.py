@@ -316,6 +316,9 @@ class Tracker:
     def set_final_states(self, *, completed: bool) -> None:
         if unseen_bins := [name for name in self.bins if name not in self._bin_contents.views]:
             self.assumption_reasons.append(f"no image showed what is in {', '.join(unseen_bins)}")
+        for name, view in self._bin_contents.views.items():
+            if view.change:
+                self.unexplained.report(f"contents {name}", view.change)
         was_weighed = any(record.belief.weight_log_ratios for record in self._records.all)
         if was_weighed and not self._is_load_cell_checked:
             text = "nothing proved the load cell: the run weighed no object whose class the looks alone prove"
@@ -415,7 +418,7 @@ class Tracker:
             return True
         if self._coverage.max_object_probability > self.config.max_miss_probability:
             return False
-        if self.unexplained.needs_look or self._bin_contents.needs_look:
+        if self.unexplained.needs_look:
             return False
         records = (record for record in self._records.all if record.item not in ignored_items)
         possible_items = [record for record in records if self._certainty.may_be_on_table(record)]
