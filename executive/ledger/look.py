@@ -281,6 +281,7 @@ class LookUpdate:
         no item is near, the observation becomes a new item, unless earlier looks found the position empty.
         """
         updated_items: list[ItemRecord] = []
+        contradicted_items: list[ItemRecord] = []
         for observation in observations:
             if self._may_show_any_item(observation, detected_items):
                 continue
@@ -297,11 +298,13 @@ class LookUpdate:
                 record.store(observation, self.look.frame, 0.0, is_unmoved=True)
             if record not in updated_items:
                 record.belief.low_confidence_count += 1
-                # A contradiction of the detected class is no evidence about an item of another class.
-                if observation.contradiction and observation.detection.label == record.detected_label:
-                    record.contradiction_count += 1
-                    record.last_contradiction = observation.contradiction
                 updated_items.append(record)
+            # A contradiction of the detected class is no evidence about an item of another class.
+            is_same_class = observation.detection.label == record.detected_label
+            if observation.contradiction and is_same_class and record not in contradicted_items:
+                record.contradiction_count += 1
+                record.last_contradiction = observation.contradiction
+                contradicted_items.append(record)
         return updated_items
 
     def _update_missed_items(self, records: Sequence[ItemRecord]) -> list[ItemRecord]:

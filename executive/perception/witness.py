@@ -67,7 +67,7 @@ def find_unexplained(
     obstacles: Collection[Obstacle],
     min_radius: float,
 ) -> list[Region]:
-    """Return the regions of a frame that neither the table, arm, bins, objects nor detections explain.
+    """Return the regions of a frame that table, arm, bins, objects and unknown classes do not explain.
 
     Args:
         look: The detections with their frame.
@@ -94,7 +94,8 @@ def find_unexplained(
         if mask is not None:
             explained_mask |= mask.astype(np.uint8)
     explained_mask = cv2.dilate(explained_mask, np.ones((2 * margin + 1,) * 2))
-    for detection in (*look.confident, *look.doubtful, *look.unknown):
+    # The known objects stand for the detections of known classes: the ledger may not believe a detection.
+    for detection in look.unknown:
         _fill_box(explained_mask, detection.box)
     unexplained_mask = searched_mask & visible_mask & (explained_mask == 0)
     image = cv2.resize(frame.image, size, interpolation=cv2.INTER_AREA).astype(np.float32)
@@ -183,7 +184,7 @@ def _make_region(frame: Frame, box: Box) -> Region:
     scale = 1000 * frame.compute_depth(position) / float(frame.matrix[0, 0])
     x, y, _ = position
     size = f"{(right - left) * scale:.0f} x {(bottom - top) * scale:.0f} mm"
-    text = f"something of {size} at ({x:.2f}, {y:.2f}) m that no detection shows, unlike the table around it"
+    text = f"something of {size} at ({x:.2f}, {y:.2f}) m that no item explains, unlike the table around it"
     return Region((left, top, right, bottom), position, text)
 
 

@@ -40,7 +40,9 @@ def search(
     frame: Frame, *detections: Detection, bins: Sequence = (), obstacles: Sequence[Obstacle] = ()
 ) -> list[Region]:
     area = (0.0, 0.0, 640.0, 480.0)
-    look = Detections("eye", detections, assume_rates(0.5, ""), frame=frame, view="full", area=area)
+    look = Detections(
+        "eye", (), assume_rates(0.5, ""), unknown=detections, frame=frame, view="full", area=area
+    )
     return find_unexplained(look, TableConfig(), bins, obstacles, 0.03)
 
 
@@ -55,10 +57,10 @@ def test_an_empty_table_has_no_region() -> None:
     assert search(draw()) == []
 
 
-def test_a_detection_a_known_object_or_a_bin_explains_a_region() -> None:
+def test_an_unknown_class_a_known_object_or_a_bin_explains_a_region() -> None:
     frame = draw((PLACE, 0.05, np.zeros(3)))
     left, top = project(MATRIX, X_WC, [PLACE])[0] - 10
-    assert search(frame, Detection("cube", 0.3, (left, top, left + 20, top + 20))) == []
+    assert search(frame, Detection("cup", 0.6, (left, top, left + 20, top + 20))) == []
     assert search(frame, obstacles=[Obstacle(0.53, 0.1, 0.035, 0.05, "cube-1")]) == []
     assert search(frame, bins=[BIN]) == []
     assert search(frame, obstacles=[Obstacle(0.53, 0.0, 0.035, 0.05, "cube-1")])
