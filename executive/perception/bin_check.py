@@ -139,6 +139,10 @@ def measure_contents(frame: Frame, bins: Sequence[Bin]) -> dict[str, tuple[float
         deviations = np.abs(image[crop] - np.median(colours, axis=0)).max(axis=2)
         is_different = shown_mask & (deviations > MIN_CONTENT_CONTRAST)
         opened = cv2.morphologyEx(is_different.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+        # What touches the hidden part may belong to the arm.
+        hidden = cv2.dilate((~visible[crop]).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+        _, labels = cv2.connectedComponents(opened)
+        opened[np.isin(labels, labels[hidden])] = 0
         if opened.sum() < MAX_COVERED_FRACTION * len(colours):
             is_whole = shown_mask.sum() == floor_mask.sum() and shown_fraction > MIN_WHOLE_FRACTION
             contents[bin.name] = (round(float(opened.sum() / scale**2), 5), bool(is_whole))
