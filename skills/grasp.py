@@ -13,9 +13,8 @@ MAX_FALSE_GRASPS = 3
 class Grasp(Skill):
     """Close the tool on the target and verify the grasp.
 
-    The skill succeeds if the tool's sensor reports an object after the settling time `settle`. The skill
-    fails with `sensor_implausible` if the sensor reports an object while the tool is still open, or if load
-    or looks contradicted the sensor after each of the last grasps.
+    The skill succeeds if the tool's sensor reports an object after the settling time `settle`. It fails with
+    `sensor_implausible` if this sensor cannot be right.
     """
 
     target: In[Target] = port(doc="the target that the tool touches")
@@ -27,7 +26,7 @@ class Grasp(Skill):
     waits = "settle"
 
     def run(self, cell: Cell) -> Steps:
-        """Check the sensor of the tool, close the tool, wait, and read its sensor."""
+        """Close the tool, wait, and read its sensor, unless the sensor is wrong already before."""
         noun = cell.tool_model.noun
         if cell.tool.holding:
             message = f"the sensor reports a {noun} while the tool is open; repair the sensor of the tool"

@@ -314,7 +314,8 @@ class Tracker:
                 self.unexplained.withdraw(f"bin {name}")
 
     def set_final_states(self, *, completed: bool) -> None:
-        if unseen_bins := [name for name in self.bins if name not in self._bin_contents.views]:
+        used_bins = {record.bin for record in self._records.filter_by_state(State.PLACED)}
+        if unseen_bins := sorted(used_bins - self._bin_contents.views.keys() - {""}):
             self.assumption_reasons.append(f"no image showed what is in {', '.join(unseen_bins)}")
         for name, view in self._bin_contents.views.items():
             if view.change:
