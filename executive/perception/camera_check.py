@@ -190,7 +190,7 @@ def _make_camera_offset(fit: PoseFit, frame: Frame, bins: Sequence[Bin]) -> Came
 def compute_bin_mask(frame: Frame, bin: Bin) -> NDArray[np.bool_]:
     """Return the mask `(H, W)` of the pixels of a bin."""
     size = (frame.visible.shape[1], frame.visible.shape[0])
-    mask = compute_hull_mask(_list_corners(bin), frame.matrix, frame.X_WC, size, may_be_cut=True)
+    mask = compute_hull_mask(list_corners(bin), frame.matrix, frame.X_WC, size, may_be_cut=True)
     return np.zeros_like(frame.visible) if mask is None else mask
 
 
@@ -364,7 +364,7 @@ def _sample_outlines(bins: Sequence[Bin], X_WC: Pose, matrix: Array) -> tuple[Ar
     next_points = [np.zeros((0, 3))]
     bin_indices = [np.zeros(0, dtype=np.intp)]
     for index, bin in enumerate(bins):
-        corners = _list_corners(bin)
+        corners = list_corners(bin)
         corners_C = X_WC.inverse().apply(corners)
         if np.any(corners_C[:, 2] < NEAR_PLANE):
             continue
@@ -381,7 +381,7 @@ def _sample_outlines(bins: Sequence[Bin], X_WC: Pose, matrix: Array) -> tuple[Ar
     return np.concatenate(points), np.concatenate(next_points), np.concatenate(bin_indices)
 
 
-def _list_corners(bin: Bin) -> Array:
+def list_corners(bin: Bin) -> Array:
     """Return the corners of the outer box of a bin `(8, 3)` [m]; the first four belong to the rim."""
     half_size = np.array([*(bin.size[:2] / 2 + BIN_THICKNESS), bin.size[2] / 2])
     signs = [(*xy, z) for z in (1, -1) for xy in ((-1, -1), (-1, 1), (1, 1), (1, -1))]

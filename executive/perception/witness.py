@@ -7,7 +7,6 @@ form regions. Arm, bins, known objects and detections explain regions.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Collection, Iterator
 
@@ -17,8 +16,9 @@ from numpy.typing import NDArray
 
 from executive.cell.config import TableConfig
 from executive.cell.frame import Box, Detections, Frame, Region
-from executive.cell.objects import BIN_THICKNESS, Bin, Obstacle
+from executive.cell.objects import Bin, Obstacle
 from executive.geometry import Array
+from executive.perception.camera_check import list_corners
 from executive.perception.camera_model import compute_heights, compute_hull_mask, intersect_plane
 from executive.perception.localization import UNKNOWN_HALF_HEIGHT
 
@@ -89,7 +89,7 @@ def find_unexplained(
     margin = round(EXPLAINED_MARGIN * scale)
     cylinders = (_list_cylinder_points(obstacle) for obstacle in obstacles)
     explained_mask = np.zeros(searched_mask.shape, dtype=np.uint8)
-    for points in (*map(_list_corners, bins), *cylinders):
+    for points in (*map(list_corners, bins), *cylinders):
         mask = compute_hull_mask(points, matrix, frame.X_WC, size, may_be_cut=True)
         if mask is not None:
             explained_mask |= mask.astype(np.uint8)
@@ -186,13 +186,6 @@ def _make_region(frame: Frame, box: Box) -> Region:
     size = f"{(right - left) * scale:.0f} x {(bottom - top) * scale:.0f} mm"
     text = f"something of {size} at ({x:.2f}, {y:.2f}) m that no item explains, unlike the table around it"
     return Region((left, top, right, bottom), position, text)
-
-
-def _list_corners(bin: Bin) -> Array:
-    """Return the corners `(8, 3)` [m] of a bin with its walls."""
-    half_size = np.array([*(bin.size[:2] / 2 + BIN_THICKNESS), bin.size[2] / 2])
-    signs = np.array([*itertools.product((-1, 1), repeat=3)])
-    return np.asarray(bin.position + (0.0, 0.0, half_size[2]) + half_size * signs)
 
 
 def _list_cylinder_points(obstacle: Obstacle) -> Array:
