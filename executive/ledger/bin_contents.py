@@ -210,14 +210,18 @@ class BinContents:
         if self.records.filter_by_state(State.DROPPED):
             self.views = {name: BinView(view.item_count, None) for name, view in self.views.items()}
             return {}
+        held_items = self.records.filter_by_state(State.HELD)
+        target_bins = {name for item in held_items for name in self.routes.get(item.label, ())}
         for name, (area, is_whole) in contents.items():
+            if name in target_bins:
+                # The tool may have released the item just now.
+                continue
             item_count = self.count_objects_in(name)
             view = self.views.get(name)
             if view is None or view.item_count != item_count:
+                if view is not None and view.change:
+                    changes[name] = view.change
                 view = self.views[name] = BinView(item_count, None if item_count else 0.0)
-                if item_count:
-                    # Objects may still roll in the first image after a release.
-                    continue
             if view.area is None and is_whole:
                 view.area = area
             if is_whole and item_count == 0 and area < min_area:

@@ -152,15 +152,18 @@ class Coverage:
         """Return True if `position` `(3,)` [m] is in the workspace or at most `WORKSPACE_TOLERANCE` away."""
         return bool(self._find_points_inside(position[None], WORKSPACE_TOLERANCE)[0])
 
-    @property
-    def max_object_probability(self) -> float:
-        """Largest probability, over the visible grid points, that an undetected object lies at the point.
+    def find_max_object_probability(self, known_positions: Sequence[Array] = ()) -> float:
+        """Return the largest probability, over the visible grid points, of an undetected object at the point.
 
-        The probability is 1 before the first look at the whole image.
+        Points at the known objects with the given positions `(3,)` [m] do not count. The probability is 1
+        before the first look at the whole image.
         """
         if not self._full_look_count:
             return 1.0
-        return float((self._priors * self._miss_probabilities)[self._visible_mask].max())
+        mask = self._visible_mask.copy()
+        for position in known_positions:
+            mask &= self._compute_distances(position) > GRID_PITCH
+        return float((self._priors * self._miss_probabilities)[mask].max(initial=0.0))
 
     def is_visible(self, position: Array) -> bool:
         """Return True if all grid points around `position` `(3,)` [m] are visible.

@@ -417,7 +417,9 @@ class Tracker:
         labels = {entry for entry in routed_labels if not self._bin_contents.explain_skipped_class(entry)}
         if routed_labels and not labels:
             return True
-        if self._coverage.max_object_probability > self.config.max_miss_probability:
+        rejected = [record.position for record in self._records.filter_by_state(State.REJECTED)]
+        object_probability = self._coverage.find_max_object_probability(rejected)
+        if object_probability > self.config.max_miss_probability:
             return False
         if self.unexplained.needs_look:
             return False

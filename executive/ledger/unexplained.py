@@ -13,6 +13,8 @@ from executive.geometry import Array
 
 SETTLING_LOOK_COUNT = 3
 """Number of looks at a region after which further looks tell nothing new."""
+MAX_UNSETTLED_LOOK_COUNT = 6
+"""Maximum number of looks in a row for which a run waits: a region may come and go with the noise."""
 
 
 @dataclass(eq=False)
@@ -35,6 +37,12 @@ class Entry:
     is_probed: bool = False
     touch_height: float | None = None
 
+    @property
+    def is_settled(self) -> bool:
+        """True if a further look tells nothing new."""
+        is_touched = self.position is None or self.touch_height is not None
+        return is_touched or self.look_count + self.miss_count >= SETTLING_LOOK_COUNT
+
 
 class Unexplained:
     """All that no item explains; a run with an open entry does not succeed.
@@ -46,6 +54,7 @@ class Unexplained:
         self._emit = emit
         self._entries: dict[str, Entry] = {}
         self._count = 0
+        self._unsettled_look_count = 0
         self._flat_places: list[Array] = []
         """Positions `(3,)` [m] of regions at which the tool touched nothing."""
 
@@ -62,11 +71,7 @@ class Unexplained:
     @property
     def needs_look(self) -> bool:
         """True if a further look may explain a region of the table."""
-        return any(
-            entry.look_count + entry.miss_count < SETTLING_LOOK_COUNT
-            for entry in self._entries.values()
-            if entry.position is not None and entry.touch_height is None
-        )
+        return 0 < self._unsettled_look_count < MAX_UNSETTLED_LOOK_COUNT
 
     def choose_place_to_probe(self) -> Array | None:
         """Return the position `(3,)` [m] of a region that two looks showed, at most once, or None."""
@@ -147,6 +152,9 @@ class Unexplained:
             entry = Entry(UnexplainedChanged(name, region.text, []), region.position, look_count=1)
             self._entries[name] = entry
             self._show(entry, region, look.frame.id)
+        self._unsettled_look_count += 1
+        if all(entry.is_settled for entry in self._entries.values()):
+            self._unsettled_look_count = 0
 
     def _show(self, entry: Entry, region: Region, frame: int) -> None:
         """Emit an entry whose region a frame shows."""

@@ -38,7 +38,7 @@ def test_every_look_leaves_as_much_doubt_as_its_detector_misses(coverage: Covera
     for looks in range(1, 5):
         coverage.update(look())
         assert coverage.find_miss_probability(MIDDLE) == pytest.approx(0.2**looks)
-        assert coverage.max_object_probability == pytest.approx(PRIOR_IN_WORKSPACE * 0.2**looks)
+        assert coverage.find_max_object_probability() == pytest.approx(PRIOR_IN_WORKSPACE * 0.2**looks)
 
 
 def test_one_look_shows_the_surroundings_empty_also_after_a_drop(coverage: Coverage) -> None:
@@ -54,7 +54,7 @@ def test_looks_at_the_workspace_alone_never_show_that_nothing_lies_beside_it(cov
     for _ in range(20):
         coverage.update(look(view="table"))
     assert coverage.find_miss_probability(MIDDLE) == MIN_MISS_PROBABILITY, "looks are not wholly independent"
-    assert coverage.max_object_probability == 1.0
+    assert coverage.find_max_object_probability() == 1.0
 
 
 def test_what_the_arm_hides_is_not_believed_empty(coverage: Coverage) -> None:
@@ -63,7 +63,7 @@ def test_what_the_arm_hides_is_not_believed_empty(coverage: Coverage) -> None:
         coverage.update(look(hidden=slice(320, 640)))
     sides = [coverage.find_miss_probability(np.array([0.53, y, 0.025])) for y in (-0.15, 0.15)]
     assert sorted(sides) == [pytest.approx(0.2**5), 1.0]
-    assert coverage.max_object_probability == PRIOR_IN_WORKSPACE
+    assert coverage.find_max_object_probability() == PRIOR_IN_WORKSPACE
 
 
 def test_a_change_brings_the_doubt_back_whatever_a_frame_from_before_shows(coverage: Coverage) -> None:

@@ -69,22 +69,21 @@ def search_regions(
             box = (left + box_left, top + box_top, left + box_right, top + box_bottom)
             label = class_map.get(detection.label, detection.label)
             detections.append((replace(detection, label=label, box=box), region))
-    return merge_detections(detections, (image.shape[1], image.shape[0]))
+    if len(regions) > 1:
+        # Another tile shows the whole object; a part of an object may look like another class.
+        size = (image.shape[1], image.shape[0])
+        detections = [pair for pair in detections if not _is_truncated(pair, size)]
+    return merge_detections(detections)
 
 
-def merge_detections(detections: Sequence[LocatedDetection], size: tuple[int, int]) -> list[Detection]:
-    """Return one detection per object, most confident first.
-
-    For an object with boxes in several regions, an untruncated box is preferred to a more confident box.
-    `size` is the width and height of the image [pixel].
-    """
-    candidates = sorted(detections, key=lambda pair: (_is_truncated(pair, size), -pair[0].confidence))
+def merge_detections(detections: Sequence[LocatedDetection]) -> list[Detection]:
+    """Return one detection per object, which may have boxes in several regions; most confident first."""
+    candidates = sorted(detections, key=lambda pair: -pair[0].confidence)
     ious, contained_fractions = compute_overlaps([detection.box for detection, _ in candidates])
     is_same_object = (ious > MIN_TILE_IOU) | (contained_fractions > MIN_CONTAINED_FRACTION)
     regions = np.array([region for _, region in candidates]).reshape(-1, 4)
     is_in_other_region = (regions[:, None] != regions).any(axis=2)
-    merged = (candidates[index][0] for index in _find_unique(is_same_object & is_in_other_region))
-    return sorted(merged, key=lambda detection: -detection.confidence)
+    return [candidates[index][0] for index in _find_unique(is_same_object & is_in_other_region)]
 
 
 def remove_duplicates(detections: Sequence[Detection]) -> list[Detection]:
