@@ -120,13 +120,13 @@ def measure_contents(frame: Frame, bins: Sequence[Bin]) -> dict[str, tuple[float
     for bin in bins:
         half_size = np.array([*(bin.size[:2] / 2 - FLOOR_MARGIN), 0.0])
         rectangle = bin.position + half_size * [(1, 1, 0), (1, -1, 0), (-1, -1, 0), (-1, 1, 0)]
+        floor_mask = np.ones(visible.shape, dtype=bool)
         # The camera sees the floor through the opening of the bin.
-        masks = [
-            compute_hull_mask(rectangle + up * height, matrix, frame.X_WC, size, may_be_cut=True)
-            for height in (BIN_THICKNESS, bin.size[2])
-        ]
-        floor_mask = np.logical_and(*masks) if all(mask is not None for mask in masks) else None
-        if floor_mask is None or not floor_mask.any():
+        for height in (BIN_THICKNESS, bin.size[2]):
+            polygon = rectangle + up * height
+            mask = compute_hull_mask(polygon, matrix, frame.X_WC, size, may_be_cut=True)
+            floor_mask &= False if mask is None else mask
+        if not floor_mask.any():
             continue
         left, top, width, height = cv2.boundingRect(floor_mask.astype(np.uint8))
         crop = np.s_[top : top + height, left : left + width]

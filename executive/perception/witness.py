@@ -88,12 +88,12 @@ def find_unexplained(
     scale = float(matrix[0, 0]) / frame.compute_depth(np.array([sum(table.x) / 2, sum(table.y) / 2, 0.0]))
     margin = round(EXPLAINED_MARGIN * scale)
     cylinders = (_list_cylinder_points(obstacle) for obstacle in obstacles)
-    explained_mask = np.zeros(searched_mask.shape, dtype=np.uint8)
+    known_mask = np.zeros(searched_mask.shape, dtype=np.uint8)
     for points in (*map(list_corners, bins), *cylinders):
         mask = compute_hull_mask(points, matrix, frame.X_WC, size, may_be_cut=True)
         if mask is not None:
-            explained_mask |= mask.astype(np.uint8)
-    explained_mask = cv2.dilate(explained_mask, np.ones((2 * margin + 1,) * 2))
+            known_mask |= mask.astype(np.uint8)
+    explained_mask = np.asarray(cv2.dilate(known_mask, np.ones((2 * margin + 1,) * 2)), dtype=np.uint8)
     # The known objects stand for the detections of known classes: the ledger may not believe a detection.
     for detection in look.unknown:
         _fill_box(explained_mask, detection.box)
@@ -136,7 +136,7 @@ def _find_deviations(
     deviations = base.copy()
     # A loop over the channels is several times faster than operations on the last axis.
     for channel, median in zip(channels, np.median(samples, axis=0), strict=True):
-        np.maximum(deviations, cv2.absdiff(channel, float(median)) / MAX_TABLE_DEVIATION, out=deviations)
+        np.maximum(deviations, np.abs(channel - median) / MAX_TABLE_DEVIATION, out=deviations)
     # The second mean contains no pixels of unknown objects.
     for _ in range(2):
         weights = (deviations < 1.0).astype(np.float32)
