@@ -15,8 +15,8 @@ from pydantic import ConfigDict, Field, JsonValue
 
 from executive.errors import MAX_TEXT_LENGTH, to_text
 
-JOURNAL_FORMAT: Final = 4
-"""Version of the journal format. Runs of format 3 have other inputs, and can only be reported."""
+JOURNAL_FORMAT: Final = 5
+"""Version of the journal format. Runs of formats 3 and 4 have other inputs, and can only be reported."""
 
 RunStatus: TypeAlias = Annotated[str, Field(pattern="^(SUCCESS|INCOMPLETE|FAILURE|FAULT|HALTED)$")]
 """Final status of a run; INCOMPLETE if the tree succeeded but items were rejected."""
@@ -292,7 +292,7 @@ class RunStarted(Event):
     base: str
     step: float
     versions: Mapping[str, str]
-    format: Literal[3, 4] = JOURNAL_FORMAT
+    format: Literal[3, 4, 5] = JOURNAL_FORMAT
     cell: str = ""
 
 

@@ -161,11 +161,15 @@ class WitnessStatistics:
         self._false_count = 0
 
     def add(self, sample: LabelledImage, frame: Frame, cell: CellConfig) -> None:
-        """Add an image: search it with all objects known, then without each completely visible object."""
+        """Add an image: search it with all objects known, then without each completely visible object.
+
+        An object at another one does not count: with the other one known, it is no region of its own.
+        """
         boxes = [*sample.boxes, *sample.ignored_boxes]
+        has_neighbour = (compute_overlaps(boxes)[0] > 0).sum(axis=1) > 1
         self._false_count += len(_find_unexplained(frame, boxes, cell))
         for index, label in enumerate(sample.labels):
-            if sample.is_fully_visible(index):
+            if sample.is_fully_visible(index) and not has_neighbour[index]:
                 regions = _find_unexplained(frame, boxes[:index] + boxes[index + 1 :], cell)
                 overlaps = compute_overlaps([boxes[index], *(region.box for region in regions)])[0][0, 1:]
                 self._total[label] += 1

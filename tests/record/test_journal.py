@@ -190,7 +190,7 @@ HALTED = '{"kind": "RunHalted", "tick": 1, "clock": 0.1, "is_tree_ticked": true}
         (HALTED.replace("0.1", "3.0").encode(), '"tick" 1 and "clock" 3.0 contradict'),
         (encode_event(at(1, read("clock", "now"))), "the clock is 'now'"),
         (encode_event(at(1, skill_ended("a"))).replace(b"SUCC", b"ODDN"), '"status" of NodeEnded'),
-        (encode_event(at(0, run_started())).replace(b'"format":4', b'"format":2'), '"format" of RunStarted'),
+        (encode_event(at(0, run_started())).replace(b'"format":5', b'"format":2'), '"format" of RunStarted'),
     ],
 )
 def test_a_line_that_is_no_event_is_an_error_with_its_number(path, line, why):
@@ -207,7 +207,7 @@ def test_an_event_that_is_too_long_for_a_journal_is_a_fault() -> None:
 
 
 def test_inputs_of_an_earlier_format_are_read_as_they_are(path: Path) -> None:
-    start = encode_event(at(0, run_started())).replace(b'"format":4', b'"format":3')
+    start = encode_event(at(0, run_started())).replace(b'"format":5', b'"format":3')
     path.write_bytes(start + encode_event(at(1, read("observations", [["a value of five parts"]]))))
     assert [type(timed.event).__name__ for timed in read_journal(path)] == ["RunStarted", "InputRead"]
 
