@@ -29,6 +29,9 @@ BIN_AREA_FRACTION = 0.04
 """Fraction of an image that a bin covers: probability that a false detection lies in the bin."""
 MIN_CHANGED_FRACTION = 0.5
 """Minimum change of the visible area in a bin, as a fraction of the area of the smallest class."""
+MAX_AREA_FACTOR = 1.6
+"""Maximum visible area of an object in a bin, as a multiple of the area of the largest class: a camera beside
+the bin sees a side of the object, too."""
 MIN_LOOKS_AT_ITEM_LEFT_BEHIND = 2
 """Minimum number of looks that prove an item at a place from which another item was picked."""
 FLOOR_POINTS = np.array([(0, 0, 0), (1, 1, 0), (1, -1, 0), (-1, 1, 0), (-1, -1, 0)])
@@ -206,7 +209,9 @@ class BinContents:
         """
         changes = {}
         # An object hidden at a wall may show a part of its area only.
-        min_area = MIN_CHANGED_FRACTION * math.pi * min(each.radius for each in self.classes.values()) ** 2
+        radii = [object_class.radius for object_class in self.classes.values()]
+        min_area = MIN_CHANGED_FRACTION * math.pi * min(radii) ** 2
+        max_area = math.pi * max(radii) ** 2
         if self.records.filter_by_state(State.DROPPED):
             self.views = {name: BinView(view.item_count, None) for name, view in self.views.items()}
             return {}
@@ -224,6 +229,8 @@ class BinContents:
                 view = self.views[name] = BinView(item_count, None if item_count else 0.0)
             if view.area is None and is_whole:
                 view.area = area
+                if area > item_count * MAX_AREA_FACTOR * max_area:
+                    changes[name] = f"more lies in {name} than the robot brought"
             if is_whole and item_count == 0 and area < min_area:
                 self.known_bins.add(name)
             if view.area is None or not (is_whole or item_count == 0):
