@@ -69,6 +69,9 @@ class ObjectConfig(Section):
     """Height of the object as it lies on the table [m]."""
     radius: Length
     """Radius of the circle around the outline of the object, seen from above [m]."""
+    flat_top: bool = False
+    """True if every point of the top has the height of the class: a lower touch then is no other point of the
+    object, but another object."""
     footprint: tuple[Length, Length] | None = None
     """Length and width of the rectangle around the outline of the object, seen from above [m]. If given, both
     sides of a detected box must fit it at some yaw, otherwise only the longer side must fit the radius."""
@@ -80,8 +83,9 @@ class ObjectConfig(Section):
     def build_class(self, label: str) -> ObjectClass:
         """Return the declared object class; if the section declares no mass, with the default mass."""
         object_class = ObjectClass(
-            label, self.height, self.radius, self.ring, looks_like=self.looks_like, footprint=self.footprint
-        )
+            label, self.height, self.radius, self.ring, looks_like=self.looks_like,
+            footprint=self.footprint, flat_top=self.flat_top,
+        )  # fmt: skip
         if self.mass is None:
             return object_class
         return replace(object_class, mass=self.mass, mass_std=self.mass_std)

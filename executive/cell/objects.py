@@ -118,6 +118,7 @@ class ObjectClass:
             file declares no mass.
         looks_like: Class whose label the detectors report for objects of this class; "": this class.
         footprint: Length and width of the rectangle around the outline, seen from above [m]; None: unknown.
+        flat_top: True if every point of the top has the height of the class.
         support_heights: Heights above the table of the surfaces on which an object of the class may lie [m].
     """
 
@@ -129,6 +130,7 @@ class ObjectClass:
     mass_std: float = math.inf
     looks_like: str = ""
     footprint: tuple[float, float] | None = None
+    flat_top: bool = False
     support_heights: tuple[float, ...] = (0.0,)
 
     @property

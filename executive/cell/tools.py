@@ -68,10 +68,12 @@ class ToolMeasurement:
 
     Attributes:
         contradiction: Sentence that states how the measured value contradicts the class, or "".
+        may_be_wrong: True if the tool may have measured at another place of the object than intended.
         is_miss: True if the tool cannot grip the object there.
     """
 
     contradiction: str = ""
+    may_be_wrong: bool = False
     is_miss: bool = False
 
 

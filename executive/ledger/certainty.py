@@ -131,15 +131,21 @@ class Certainty:
         """Update an item with a measurement of the tool; return False if it contradicts the class.
 
         After a measurement that agrees with the class, others are no contradiction, because the item may have
-        tipped over.
+        tipped over. The first measurement that may be wrong is no contradiction if the looks prove the class.
         """
         record.belief.is_confirmed = True
         record.had_contact = True
         record.empty_probe_count = 0
         if not measurement.contradiction:
             record.confirmed_label = record.label
+            record.doubtful_measurement_count = 0
         if record.confirmed_label == record.label:
             return True
+        if measurement.may_be_wrong:
+            record.doubtful_measurement_count += 1
+            is_first = record.doubtful_measurement_count == 1
+            if is_first and record.belief.class_error <= self.config.max_class_error:
+                return True
         record.last_contradiction = measurement.contradiction
         return False
 

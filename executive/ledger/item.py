@@ -89,6 +89,7 @@ class ItemRecord:
         empty_probe_count: Number of descents that found only the table, since the item was moved or touched.
         had_contact: True if the tool has touched the item at any height.
         confirmed_label: Class that the last measurement of the tool confirmed, or "".
+        doubtful_measurement_count: Number of measurements that may be wrong, since the last confirmed class.
         contradiction_count: Number of images that contradict the class since the last possible move.
         last_contradiction: Last evidence of an image, measurement or weight against the class, or "".
         bin_log_odds: For each bin, log odds that the dropped item lies in the bin.
@@ -126,6 +127,7 @@ class ItemRecord:
     empty_probe_count: int = 0
     had_contact: bool = False
     confirmed_label: str = ""
+    doubtful_measurement_count: int = 0
     contradiction_count: int = 0
     last_contradiction: str = ""
     bin_log_odds: dict[str, float] = field(default_factory=lambda: defaultdict(float))
@@ -257,6 +259,7 @@ class ItemRecord:
             self.belief = new_item.belief
             self.belief.is_confirmed |= is_confirmed
             self.confirmed_label = ""
+            self.doubtful_measurement_count = 0
         self.empty_probe_count = 0
         self.was_taken_away = False
         # `first_position` stays the position before the move.

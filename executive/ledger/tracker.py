@@ -322,8 +322,7 @@ class Tracker:
                 self.unexplained.report(f"contents {name}", view.change)
         was_weighed = any(record.belief.weight_log_ratios for record in self._records.all)
         if was_weighed and not self._is_load_cell_checked:
-            text = "nothing proved the load cell: the run weighed no object whose class the looks alone prove"
-            self.unexplained.report("load cell", text)
+            self.assumption_reasons.append("the load cell has the right gain: no known object proved it")
         has_confirmed_item = any(self._confirmed_labels)
         dropped = self._records.filter_by_state(State.DROPPED)
         dropped_items = [record for record in dropped if not record.was_taken_away]

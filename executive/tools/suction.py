@@ -33,6 +33,11 @@ GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
 """Angle between two successive points of a Vogel spiral [rad]."""
 
 
+OTHER_CLASS_TOLERANCE = 0.0025
+"""Maximum difference between the height of a touch and the height of another class to which the object may
+belong [m]."""
+
+
 class Suction(ToolModel):
     """A suction tool with one bellows cup; `tests/benchmarks/suction_map.py` justifies the constants.
 
@@ -107,13 +112,14 @@ class Suction(ToolModel):
         object_class: ObjectClass,
         position: Array,
         height: float,
-        classes: Mapping[str, ObjectClass],  # noqa: ARG002
+        classes: Mapping[str, ObjectClass],
         overtravel: float = OVERTRAVEL,
     ) -> ToolMeasurement:
         """Return the evidence of the height of a touch.
 
         A touch at a wrong height missed the top if it is below the centre of the object or more than
-        `overtravel` below its top.
+        `overtravel` below its top. It may have hit the object beside its top if it is too low for the assumed
+        class, no class has this height, and the top is not flat.
         """
         if min(abs(height - top) for top in object_class.top_heights) <= self.touch_tolerance:
             return ToolMeasurement()
@@ -122,7 +128,12 @@ class Suction(ToolModel):
             f"{object_class.height * 1000:.0f} mm high"
         )
         is_near_top = height >= _compute_min_contact_height(object_class, float(position[2]), overtravel)
-        return ToolMeasurement(contradiction, is_miss=not is_near_top)
+        fits_no_class = all(
+            abs(height - top) > OTHER_CLASS_TOLERANCE for each in classes.values() for top in each.top_heights
+        )
+        is_low = height < object_class.height
+        may_be_wrong = is_near_top and is_low and fits_no_class and not object_class.flat_top
+        return ToolMeasurement(contradiction, may_be_wrong, is_miss=not is_near_top)
 
     def find_distinct_labels(self, classes: Mapping[str, ObjectClass]) -> frozenset[str]:
         """Return the classes whose height differs by more than `touch_tolerance` from all others."""

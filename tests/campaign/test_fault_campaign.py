@@ -117,7 +117,7 @@ def test_a_reason_is_caused_in_the_cell_or_else_by_the_skill(campaign: Campaign)
     [
         ("Grasp", "missed", "first", "ok"),
         ("Detect", "unavailable", "lasting", "FAILURE Detect.unavailable"),
-        pytest.param("Grasp", "missed", "lasting", "ok -6", marks=SLOW),
+        pytest.param("Grasp", "missed", "lasting", "FAILURE Grasp.sensor_implausible", marks=SLOW),
         pytest.param("Approach", "target: object_removed", "middle", "FAILURE lost", marks=SLOW),
         pytest.param("object", "object_removed", "late", "FAILURE lost", marks=SLOW),
     ],

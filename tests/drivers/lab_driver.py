@@ -1,7 +1,6 @@
-"""Driver of a laboratory cell: an arm that jumps, a list of images as camera, and a tool with a flag.
+"""Driver of a laboratory cell, an example to copy: an arm that jumps, a list of images, a tool with a flag.
 
-An example to copy; beside this file, an integrator writes only one entry point in the group
-`executive.drivers`, `lab = "lab_driver:LabDriver"`.
+The entry point in the group `executive.drivers` is `lab = "lab_driver:LabDriver"`.
 """
 
 from __future__ import annotations
@@ -24,8 +23,7 @@ OBJECT_HEIGHT = 0.05
 """Height of all objects [m]."""
 OBJECT_WEIGHT = 1.0
 """Weight of all objects [N]."""
-GUARD_PERIOD = 0.001
-"""Time between two checks of a guard on the path of a motion [s]."""
+GUARD_PERIOD = 0.001  # Time between two checks of a guard on the path of a motion [s].
 
 
 class LabArm:
@@ -113,7 +111,10 @@ class LabDriver:
 
     def capture(self) -> CameraImage:
         """Show the table after the last pick."""
-        return CameraImage(self._images[self.arm.tool.pick_count], None, self.clock.now)
+        image = self._images[self.arm.tool.pick_count]
+        image[0, 0, 0] = round(240 * self.clock.now) % 256  # No camera gives the same pixels twice.
+        visible = np.pad(np.ones((256, 256), np.bool_), ((100, 124), (192, 192)))  # without arm and bins
+        return CameraImage(image, None, self.clock.now, visible)
 
     def close(self) -> None:
         """There is nothing to release."""

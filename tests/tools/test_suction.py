@@ -122,3 +122,11 @@ def test_an_approach_never_feels_below_the_middle_of_what_it_is_to_touch() -> No
     (further,) = TOOL.list_grasps(washer, target, motion, GraspAttempt(1, overtravel=0.001))
     assert further.goal.position[2] == pytest.approx(0.015)
     assert math.dist(further.goal.position[:2], (0.5, 0.1)) == pytest.approx(0.017)
+
+
+@pytest.mark.parametrize(
+    ("label", "height", "is_possible"),
+    [("sphere", 0.04, True), ("sphere", 0.05, False), ("sphere", 0.065, False), ("cube", 0.035, True)],
+)
+def test_a_touch_that_is_too_low_for_all_classes_may_have_missed_the_top(label, height, is_possible):
+    assert measure(label, height).may_be_wrong is is_possible
