@@ -14,7 +14,8 @@ from rich.console import RenderableType
 from rich.table import Column, Table
 
 from executive.cell.config import CellConfig, DetectorConfig
-from executive.drivers.sim.scene import find_max_object_count, load_scene
+from executive.drivers.sim.scene import load_scene
+from executive.drivers.sim.spawn import find_max_object_count
 from executive.errors import InputError, explain_os_errors
 from executive.mission.cell_file import load_cell
 from executive.perception.detectors import envelope

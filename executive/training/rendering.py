@@ -32,7 +32,8 @@ from executive.drivers.sim.camera import (
     get_camera_pose,
     render,
 )
-from executive.drivers.sim.scene import DECLARED_SCENE, SceneConfig, build_world, spawn_objects
+from executive.drivers.sim.scene import DECLARED_SCENE, SceneConfig, build_world
+from executive.drivers.sim.spawn import spawn_objects
 from executive.drivers.sim.world import WOOD_TEXTURE
 from executive.errors import InputError
 from executive.perception.camera_model import compute_calibration, intersect_plane, project

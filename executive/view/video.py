@@ -16,7 +16,7 @@ from executive.cell.config import CellConfig
 from executive.cell.device_config import STEP
 from executive.drivers.sim.camera import Image, Light, render
 from executive.drivers.sim.driver import WorldRebuilder
-from executive.drivers.sim.scene import build_world_of_run
+from executive.drivers.sim.spawn import build_world_of_run
 from executive.drivers.world_log import RUN_STEP, read_commands
 from executive.errors import InputError, explain_os_errors
 from executive.geometry import Array, Pose

@@ -16,7 +16,7 @@ from executive.cell.config import CellConfig
 from executive.cell.objects import ObjectClass, Obstacle, Target
 from executive.cell.tools import GraspAttempt
 from executive.drivers.sim.models import compute_mass, load_mesh
-from executive.drivers.sim.scene import spawn_objects
+from executive.drivers.sim.spawn import spawn_objects
 from executive.drivers.sim.world import World
 from executive.errors import InputError, Unreachable
 from executive.geometry import make_tool_down_pose

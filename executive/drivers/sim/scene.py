@@ -1,9 +1,8 @@
-"""Initial world of a run: the changes of a scene file, and random objects at rest on the table."""
+"""Scene files: changes of the simulated world that the cell file does not declare."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
@@ -25,20 +24,14 @@ from executive.cell.device_config import (
     TransformConfig,
     check_ascending,
 )
-from executive.cell.devices import derive_seeds
-from executive.cell.objects import UNKNOWN_LABEL
 from executive.drivers.sim.camera import Light
 from executive.drivers.sim.models import (
     DAMAGED_MODEL_NUMBER,
-    DROP_HEIGHT,
     UNKNOWN_MODEL_COUNT,
-    load_mesh,
-    load_unknown_model,
     scale_model,
 )
 from executive.drivers.sim.world import TEXTURES, WOOD_TEXTURE, World
-from executive.errors import InputError
-from executive.geometry import Array, Pose, rotate_about_z
+from executive.geometry import Pose
 from executive.perception.camera_model import (
     compute_calibration,
     compute_camera_matrix,
@@ -47,7 +40,7 @@ from executive.perception.camera_model import (
 )
 from executive.text.files import read_source
 from executive.text.findings import Finding, MissionError, make_error, sort_findings, suggest_choice
-from executive.text.validate import KeyPath, find_span, validate
+from executive.text.validate import find_span, validate
 from executive.text.yaml_files import YamlNode, parse_yaml
 
 ANY_CLASS = "any"
@@ -203,15 +196,12 @@ def load_scene(path: str | Path | None, config: CellConfig) -> SceneConfig:
 
 
 def _find_cell_findings(scene: SceneConfig, root: YamlNode, config: CellConfig) -> Iterator[Finding]:
-    for label in scene.objects:
-        if label not in (ANY_CLASS, *config.objects):
-            span = find_span(root, ("objects", label), at_key=True)
-            hint = suggest_choice(label, (*config.objects, ANY_CLASS), "Valid keys")
-            yield make_error(span, "unknown-class", f'the cell {config.cell} has no class "{label}"', hint)
-    for name in set(scene.bins) - set(config.bins):
-        span = find_span(root, ("bins", name), at_key=True)
-        hint = suggest_choice(name, config.bins, "Valid bins")
-        yield make_error(span, "unknown-bin", f'the cell {config.cell} has no bin "{name}"', hint)
+    declared = {"class": ("objects", (*config.objects, ANY_CLASS)), "bin": ("bins", tuple(config.bins))}
+    for kind, (section, choices) in declared.items():
+        for key in (key for key in getattr(scene, section) if key not in choices):
+            span = find_span(root, (section, key), at_key=True)
+            hint = suggest_choice(key, choices, "Valid keys")
+            yield make_error(span, f"unknown-{kind}", f'the cell {config.cell} has no {kind} "{key}"', hint)
     name, camera = next(iter(config.cameras.items()))
     if any(scene.camera.orbit_deg) and camera.mount != "fixed":
         yield make_error(
@@ -242,20 +232,15 @@ def apply_scene(config: CellConfig, scene: SceneConfig) -> CellConfig:
     table = config.table.model_copy(update=table_changes)
     objects = {label: _change_object(label, model, scene) for label, model in config.objects.items()}
     cameras = {name: _change_camera(camera, scene) for name, camera in config.cameras.items()}
-    bins = {name: _change_bin(bin, scene.bins.get(name)) for name, bin in config.bins.items()}
-    present_bins = {name: bin for name, bin in bins.items() if bin is not None}
-    changes = {"table": table, "objects": objects, "bins": present_bins, "cameras": cameras}
-    return config.model_copy(update=changes)
+    sections = {name: scene.bins.get(name, SceneBinConfig()) for name in config.bins}
+    present_names = [name for name in config.bins if not sections[name].missing]
+    bins = {name: _change_bin(config.bins[name], sections[name]) for name in present_names}
+    return config.model_copy(update={"table": table, "objects": objects, "bins": bins, "cameras": cameras})
 
 
-def _change_bin(bin: BinConfig, section: SceneBinConfig | None) -> BinConfig | None:
-    """Return the true bin, or None if it is missing."""
-    if section is None:
-        return bin
-    x, y, z = bin.position
-    position = (x + section.shift[0], y + section.shift[1], z)
-    changes = {"position": position, "colour": section.colour or bin.colour}
-    return None if section.missing else bin.model_copy(update=changes)
+def _change_bin(bin: BinConfig, section: SceneBinConfig) -> BinConfig:
+    position = (*np.add(bin.position[:2], section.shift).tolist(), bin.position[2])
+    return bin.model_copy(update={"position": position, "colour": section.colour or bin.colour})
 
 
 def _change_object(label: str, model: ObjectConfig, scene: SceneConfig) -> ObjectConfig:
@@ -292,170 +277,3 @@ def _change_camera(camera: CameraConfig, scene: SceneConfig) -> CameraConfig:
 
 def _make_rotation(vector_deg: ArrayLike) -> Pose:
     return Pose(np.asarray(cv2.Rodrigues(np.radians(vector_deg))[0]), np.zeros(3))
-
-
-MAX_STACK_OFFSET = 0.004
-"""Maximum offset between the axes of two stacked objects, along x and y [m]."""
-PUSH_SPEED = 0.1
-"""Horizontal speed given to an upper object to test a stack [m/s]; a stable object stops within 1 mm."""
-
-
-def build_initial_world(
-    config: CellConfig, seed: int, *, gui: bool = False, scene: SceneConfig = DECLARED_SCENE
-) -> World:
-    """Return the initial world of the run with a seed: arm at `home`, objects at rest on the table.
-
-    Raises:
-        InputError: The workspace has no room for the objects.
-    """
-    world = build_world(config, scene, gui=gui)
-    object_seed, *_ = derive_seeds(seed)
-    spawn_objects(world, object_seed, scene.unknown)
-    world.rest_positions = {body: [world.get_object_pose(body).position] for body in world.labels}
-    return world
-
-
-def build_world_of_run(
-    config: CellConfig, seed: int, driver_options: Mapping[str, str]
-) -> tuple[World, SceneConfig]:
-    """Return the initial world of a run, and its scene.
-
-    The options are `scene`, the path of a scene file, and `gui`, which shows the world in a window.
-
-    Raises:
-        MissionError: The scene file is invalid; the error lists all findings.
-        InputError: The workspace has no room for the objects, or there is no scene file.
-    """
-    scene = load_scene(driver_options.get("scene"), config)
-    return build_initial_world(config, seed, gui="gui" in driver_options, scene=scene), scene
-
-
-def spawn_objects(world: World, seed: int, unknown: UnknownConfig | None = None) -> tuple[int, ...]:
-    """Put random objects on the table, simulate until they are at rest, and return the bodies.
-
-    The cell file of the world states the classes and the range of their number.
-
-    Raises:
-        InputError: The workspace has no room for the objects.
-    """
-    config = world.config
-    rng = np.random.default_rng(seed)
-    count = int(rng.integers(*config.table.objects, endpoint=True))
-    labels = [str(label) for label in rng.choice(list(config.objects), count)]
-    models = [(label, config.objects[label]) for label in labels]
-    if unknown is not None:
-        models += [(UNKNOWN_LABEL, model) for model in _draw_unknown_models(unknown, rng)]
-    positions = draw_positions(config, [model.radius for _, model in models], rng)
-    bodies = []
-    for (label, model), position in zip(models, positions, strict=True):
-        height = DROP_HEIGHT - load_mesh(model).bottom
-        X_WO = Pose(rotate_about_z(rng.uniform(0, math.tau)), np.array([*position, height]))
-        colour = model.colours[int(rng.integers(len(model.colours)))]
-        bodies.append(world.add_object(label, X_WO, colour, model))
-    world.settle(bodies)
-    if config.table.stacked:
-        _stack_objects(world, bodies[:count], config.table.stacked, rng)
-    return tuple(bodies)
-
-
-def _draw_unknown_models(unknown: UnknownConfig, rng: np.random.Generator) -> Iterator[ObjectConfig]:
-    first_number, last_number = unknown.models
-    numbers = [number for number in range(first_number, last_number + 1) if number != DAMAGED_MODEL_NUMBER]
-    count = int(rng.integers(*unknown.count, endpoint=True))
-    for number in rng.choice(numbers, count):
-        model = scale_model(load_unknown_model(int(number)), unknown.scale)
-        yield model.model_copy(update={"colours": unknown.colours})
-
-
-def _stack_objects(world: World, bodies: Sequence[int], probability: float, rng: np.random.Generator) -> None:
-    """Put objects at rest, each with a probability of 0 to 1, on others, in stacks of two.
-
-    A simulation tests each stack, first without and then with a push. If the upper object falls, all objects
-    return to their previous poses. Balls are therefore never stacked.
-    """
-    unstacked = set(bodies)
-    for upper in bodies:
-        if rng.random() >= probability or upper not in unstacked:
-            continue
-        for lower in map(int, rng.permutation(sorted(unstacked - {upper}))):
-            if _try_stack(world, upper, lower, rng):
-                unstacked -= {upper, lower}
-                break
-
-
-def _try_stack(world: World, upper: int, lower: int, rng: np.random.Generator) -> bool:
-    """Put one object on another and return True if the stack is stable; otherwise restore all poses."""
-    initial_poses = {body: world.get_object_pose(body) for body in world.labels}
-    lower_position = initial_poses[lower].position
-    lower_mesh, upper_mesh = (load_mesh(world.models[body]) for body in (lower, upper))
-    height = lower_position[2] + lower_mesh.top - upper_mesh.bottom + DROP_HEIGHT
-    offset = rng.uniform(-MAX_STACK_OFFSET, MAX_STACK_OFFSET, 2)
-    position = np.array([*(lower_position[:2] + offset), height])
-    goals = {**initial_poses, upper: Pose(rotate_about_z(rng.uniform(0, math.tau)), position)}
-    world.place_object(upper, goals[upper])
-    world.settle(goals, goals)
-    angle = rng.uniform(0, math.tau)
-    world.client.resetBaseVelocity(upper, [PUSH_SPEED * math.cos(angle), PUSH_SPEED * math.sin(angle), 0.0])
-    world.settle(goals, goals)
-    if not world.has_moved(goals):
-        return True
-    for body, X_WO in initial_poses.items():
-        world.place_object(body, X_WO)
-    return False
-
-
-MAX_POSITION_ATTEMPTS = 2000
-"""Number of random positions for one set of objects after which the workspace counts as too small."""
-OBJECT_SET_COUNT = 5
-"""Number of random sets of objects for which `find_object_count_errors` tries to find positions."""
-
-
-def find_object_count_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield the key and an error if no random set with the maximum number of objects fits the workspace."""
-    message = ""
-    for seed in range(OBJECT_SET_COUNT):
-        rng = np.random.default_rng(seed)
-        labels = [str(label) for label in rng.choice(list(config.objects), config.table.objects[1])]
-        try:
-            draw_positions(config, [config.objects[label].radius for label in labels], rng)
-            return
-        except InputError as error:
-            message = str(error)
-    yield ("table", "objects"), message
-
-
-def find_max_object_count(config: CellConfig, limit: int) -> int:
-    """Return the maximum number of objects, up to `limit`, for which the workspace has room."""
-    for count in range(limit, 0, -1):
-        table = config.table.model_copy(update={"objects": (0, count)})
-        if not any(find_object_count_errors(config.model_copy(update={"table": table}))):
-            return count
-    return 0
-
-
-def draw_positions(config: CellConfig, radii: Sequence[float], rng: np.random.Generator) -> list[Array]:
-    """Return random positions `(2,)` [m] of circles with the given radii [m] and the gap of the cell file.
-
-    After a failed attempt to position a circle, all circles are positioned again with a probability of 2 %.
-
-    Raises:
-        InputError: The workspace has no room for the circles.
-    """
-    low, high = np.array([config.table.x, config.table.y]).T
-    positions: list[Array] = []
-    for _ in range(MAX_POSITION_ATTEMPTS):
-        if len(positions) == len(radii):
-            return positions
-        position = rng.uniform(low, high)
-        radius = radii[len(positions)]
-        circles = zip(positions, radii, strict=False)
-        gaps = [np.linalg.norm(position - centre) - radius - other_radius for centre, other_radius in circles]
-        if min(gaps, default=math.inf) >= config.table.gap:
-            positions.append(position)
-        elif rng.random() < 0.02:
-            positions = []
-    raise InputError(
-        f"{len(radii)} objects found no room on the workspace of cell {config.cell}, "
-        f"{high[0] - low[0]:.2f} m by {high[1] - low[1]:.2f} m, {config.table.gap * 1000:.0f} mm apart; "
-        "ask for fewer or widen table.x and table.y"
-    )

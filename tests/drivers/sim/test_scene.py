@@ -18,13 +18,8 @@ from executive.cell.frame import Frame, TrueFrame
 from executive.cell.objects import UNKNOWN_LABEL
 from executive.drivers.sim.camera import CELL_LIGHT
 from executive.drivers.sim.models import load_mesh
-from executive.drivers.sim.scene import (
-    DECLARED_SCENE,
-    SceneConfig,
-    apply_scene,
-    build_initial_world,
-    load_scene,
-)
+from executive.drivers.sim.scene import DECLARED_SCENE, SceneConfig, apply_scene, load_scene
+from executive.drivers.sim.spawn import build_initial_world
 from executive.drivers.sim.world import World
 from executive.errors import InputError
 from executive.events import discard_event

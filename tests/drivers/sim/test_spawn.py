@@ -8,7 +8,7 @@ import pytest
 
 from executive.cell.config import CellConfig
 from executive.cell.devices import derive_seeds
-from executive.drivers.sim.scene import spawn_objects
+from executive.drivers.sim.spawn import spawn_objects
 from executive.drivers.sim.world import World
 from executive.errors import InputError
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from executive.cell.config import CellConfig
-from executive.drivers.sim.scene import spawn_objects
+from executive.drivers.sim.spawn import spawn_objects
 from executive.drivers.sim.world import SimVisuals, World
 
 
