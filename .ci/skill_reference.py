@@ -64,7 +64,7 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
         ("observation = cell.localizer.localize(detections)[0]", "cell/frame.py", "Observation"),
     ],
     "Ledger": [
-        ("cell.ledger", "cell/protocols.py", "Ledger"),
+        ("cell.ledger", "cell/ledger.py", "Ledger"),
         ("target = cell.ledger.find_targets()[0]", "cell/objects.py", "Target"),
     ],
     "Operator": [("cell.operator", "cell/protocols.py", "Operator")],

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Generator
 
+from executive.cell.ledger import Presence
 from executive.cell.objects import Item
-from executive.cell.protocols import Cell, Presence, Steps
+from executive.cell.protocols import Cell, Steps
 from executive.manipulation.motions import capture_and_detect, complete, localize_and_observe
 from executive.skill import In, SkillFailed, param, port
 from skills.detect import LookingSkill

@@ -16,7 +16,7 @@ from executive.campaign.fault_list import INJECTED_MESSAGE, FaultLister, Planned
 from executive.campaign.jobs import JobOptions, MissionUnderTest, run_jobs
 from executive.errors import InputError
 from executive.events import RunEnded
-from executive.ledger.certainty import is_balanced
+from executive.ledger.final_states import is_balanced
 from executive.mission.analysis import UnhandledFailure
 from executive.record.journal import Recorder
 from executive.record.recorded_run import execute_recorded, make_run_directory

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -192,6 +193,20 @@ class Region:
     box: Box
     position: Array
     text: str
+
+
+class BinAppearance(NamedTuple):
+    """What a frame shows of a bin.
+
+    Attributes:
+        contradiction: "" if the bin is as declared, otherwise a sentence; None if too little is in view.
+        area: Area that differs from the floor of the bin [m²]; None if too little of the floor is in view.
+        is_whole: True if the whole floor is in view.
+    """
+
+    contradiction: str | None = None
+    area: float | None = None
+    is_whole: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,9 +10,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from executive.cell.config import LedgerConfig
-from executive.cell.frame import Detections, ErrorRates, Observation
+from executive.cell.frame import BinAppearance, Detections, ErrorRates, Observation
+from executive.cell.ledger import Presence
 from executive.cell.objects import BIN_THICKNESS, Bin, ObjectClass, Quotas, is_quota_reached
-from executive.cell.protocols import Presence, Routes
+from executive.cell.protocols import Routes
 from executive.geometry import Array
 from executive.ledger.belief import make_viewpoint_key
 from executive.ledger.certainty import REASON_CONTRADICTED
@@ -201,11 +202,11 @@ class BinContents:
             self.surplus_counts[key] = max(self.surplus_counts[key], count - self.count_placed(*key))
         self.known_bins.update(name for name in self.bins if self.is_floor_visible(name, detections))
 
-    def compare_contents(self, contents: Mapping[str, tuple[float, bool]]) -> dict[str, str]:
+    def compare_contents(self, appearances: Mapping[str, BinAppearance]) -> dict[str, str]:
         """Return sentences on bins whose contents two images show changed, although the robot did not act.
 
-        The sentences are by name of the bin, `contents` as in `Camera.measure_bins`. While the position of an
-        item is unknown, it may be in any bin.
+        The sentences are by name of the bin, `appearances` as in `Camera.inspect_bins`. While the position of
+        an item is unknown, it may be in any bin.
         """
         changes = {}
         # An object hidden at a wall may show a part of its area only.
@@ -217,9 +218,9 @@ class BinContents:
             return {}
         held_items = self.records.filter_by_state(State.HELD)
         target_bins = {name for item in held_items for name in self.routes.get(item.label, ())}
-        for name, (area, is_whole) in contents.items():
-            if name in target_bins:
-                # The tool may have released the item just now.
+        for name, (_, area, is_whole) in appearances.items():
+            # The tool may have released a held item just now.
+            if area is None or name in target_bins:
                 continue
             item_count = self.count_objects_in(name)
             view = self.views.get(name)
@@ -244,6 +245,20 @@ class BinContents:
             verb = "came into" if area > view.area else "left"
             view.change = f"something {verb} {name}, and the robot did not do it" if is_changed else ""
         return changes
+
+    def discard_items_left_behind(self) -> dict[str, str]:
+        """Discard placed items that looks show where they were picked, and return a sentence on each."""
+        texts = {}
+        for placed in self.records.filter_by_state(State.PLACED):
+            if (left := self.find_item_left_behind(placed)) is None:
+                continue
+            text = f"looks showed {left.item} where {placed.item} had been picked: {placed.bin} received"
+            texts[placed.item] = f"{text} another object, or nothing"
+            placed.bin = ""
+            placed.slot = None
+            placed.set_state(State.PHANTOM, f"it is {left.item}")
+            self.records.emit(placed)
+        return texts
 
     def find_item_left_behind(self, placed: ItemRecord) -> ItemRecord | None:
         """Return the item that looks showed at the place of a placed item after its pick, or None.

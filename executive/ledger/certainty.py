@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from executive.cell.config import LedgerConfig
 from executive.cell.tools import ToolMeasurement
-from executive.ledger.item import ON_TABLE, REASON_NOT_FOUND, REASON_UNCERTAIN, ItemRecord, State
+from executive.ledger.item import REASON_UNCERTAIN, ItemRecord, State
 
 REASON_CONTRADICTED = "images contradict the declared place or colour of"
 """Start of the reason of the state REJECTED of an item without a bin that may be used."""
@@ -35,10 +35,6 @@ MAX_CLASS_ERROR_FOR_MEASUREMENT = 0.2
 """Maximum class error of an item that the tool may touch to determine the class by a measurement."""
 MIN_UNCERTAIN_LOOKS_TO_REJECT = 10
 """Minimum number of looks in a row with only doubtful detections of a rejected item."""
-MIN_EMPTY_PROBES = 3
-"""Minimum number of descents that touched only the table (`ItemRecord.empty_probe_count`) at a phantom."""
-FINAL_STATES = (State.PLACED, State.REJECTED, State.SKIPPED, State.LOST)
-"""Final states of items that exist; other items end as PHANTOM."""
 
 
 @dataclass(frozen=True)
@@ -149,58 +145,6 @@ class Certainty:
         record.last_contradiction = measurement.contradiction
         return False
 
-    def find_final_state(
-        self, record: ItemRecord, *, skip_reason: str, is_completed: bool, has_confirmed_item: bool
-    ) -> tuple[State, str] | None:
-        """Return the final state of an item and the reason, or None if the current state is final.
-
-        The first rule that applies determines the state:
-
-        1. An item in the tool is rejected.
-        2. An item is rejected if all its detections are doubtful and all later images of its place show it.
-        3. An item whose probability of existence is below 0.5 is a phantom, unless it probably was there and
-           left (`Belief.removal_probability`).
-        4. An item that the tool never touched in at least `MIN_EMPTY_PROBES` descents to the table is a
-           phantom, if a measurement of the tool has confirmed the class of another item.
-        5. A dropped item that the tool may have moved while the journal was incomplete is rejected.
-        6. An item is lost if it was dropped, or if it left its position on the table.
-        7. An item that is already rejected stays rejected.
-        8. An item whose class has no route, or no bin below its quota, is skipped; it is rejected if images
-           contradict a bin of its class.
-        9. If the mission was completed, an item with sufficient evidence (`is_certain`), no failed attempt
-           and no evidence against its class is skipped, because a quota was reached or the operator quit.
-        10. Any other item is rejected.
-
-        Args:
-            record: The item.
-            skip_reason: Reason why the mission does not sort objects of the item's class, or "".
-            is_completed: True if the behaviour tree succeeded.
-            has_confirmed_item: True if a measurement of the tool has confirmed the class of any item.
-        """
-        belief = record.belief
-        if record.state is State.HELD:
-            return State.REJECTED, "still in the tool when the run ended"
-        if record.state not in (*ON_TABLE, State.DROPPED):
-            return None
-        if record.state is State.SEEN and not belief.look_count and belief.miss_probability == 1.0:
-            return State.REJECTED, REASON_UNCERTAIN
-        if not belief.is_probable and belief.removal_probability < 0.5:
-            return State.PHANTOM, REASON_NOT_FOUND
-        if record.empty_probe_count >= MIN_EMPTY_PROBES and has_confirmed_item and not record.had_contact:
-            count = record.empty_probe_count
-            return State.PHANTOM, f"the tool found only the table at its position, {count} times"
-        if record.state is State.DROPPED or self.is_position_empty(record) or not belief.is_probable:
-            return State.LOST, "known to exist, not found again"
-        if record.state is State.REJECTED:
-            return None
-        if skip_reason:
-            is_contradicted = skip_reason.startswith(REASON_CONTRADICTED)
-            return State.REJECTED if is_contradicted else State.SKIPPED, skip_reason
-        had_problem = record.failed_pick_count or record.last_contradiction
-        if is_completed and self.is_certain(record) and not had_problem:
-            return State.SKIPPED, "the mission was completed without it"
-        return State.REJECTED, "the run ended before its turn"
-
     def _needs_other_viewpoint(self, record: ItemRecord) -> bool:
         """Return True if only looks from a second viewpoint can prove the class of an item."""
         belief = record.belief
@@ -210,35 +154,3 @@ class Certainty:
             and len(belief.last_label_by_viewpoint) == 1
             and record.label not in self.distinct_labels
         )
-
-
-def discard_moved_items(records: Collection[ItemRecord], dropped: Collection[ItemRecord]) -> list[ItemRecord]:
-    """Set lost items that a person has moved elsewhere to PHANTOM, and return the phantoms.
-
-    An item that may have left its place counts as lost. A lost item counts as moved if a new item of the same
-    class appeared at an empty position after the last detection of the lost item; one earlier look at the
-    position suffices if the lost item is known to have left its place. The new item must be proved to exist,
-    and replaces only one lost item. Lost items in `dropped` do not count, because the tool held them after
-    their last detection.
-    """
-    new_items = [record for record in records if record.belief.is_confirmed and record.state in FINAL_STATES]
-    phantoms = []
-    lost_items = (record for record in records if record.state is State.LOST or record.may_have_left)
-    for lost_item in (record for record in lost_items if record not in dropped):
-        candidates = (
-            item
-            for item in new_items
-            if item.detected_label == lost_item.detected_label
-            and item.first_stamp > lost_item.stamp
-            and (item.was_place_empty or (lost_item.was_taken_away and item.was_place_searched))
-        )
-        if new_item := next(candidates, None):
-            lost_item.set_state(State.PHANTOM, f"it is {new_item.item}")
-            new_items.remove(new_item)
-            phantoms.append(lost_item)
-    return phantoms
-
-
-def is_balanced(counts: Mapping[str, int]) -> bool:
-    """Return True if `seen` is the sum of `placed`, `rejected`, `skipped` and `lost`."""
-    return counts["seen"] == sum(counts[state.value] for state in FINAL_STATES)

@@ -174,6 +174,15 @@ class ItemRecord:
         is_missed = self.state is State.PHANTOM and self.reason == REASON_NOT_FOUND
         return is_missed and self.belief.removal_probability >= MIN_REMOVAL_PROBABILITY
 
+    @property
+    def known_state(self) -> str:
+        """State for skills (`KnownItem.state`) of an item that the mission sorts."""
+        if self.state is State.DROPPED:
+            return State.REJECTED.value if self.reason else State.LOST.value
+        if self.state is State.SEEN:
+            return "deferred" if self.deferral_rank else "open"
+        return self.state.value
+
     def distance_to(self, position: Array) -> float:
         """Return the distance [m] of the item from a position `(3,)` [m]."""
         return float(np.linalg.norm(self.position - position))

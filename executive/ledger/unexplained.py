@@ -86,37 +86,28 @@ class Unexplained:
         for key, entry in list(self._entries.items()):
             if entry.position is place and height is None:
                 self._flat_places.append(place)
-                self.withdraw(key)
+                self._close(key)
             elif entry.position is place:
                 entry.touch_height = height
 
-    def report(self, key: str, text: str, position: Array | None = None, frame: int = 0) -> None:
-        """Open an entry, or replace the text of the entry with this key.
+    def report(self, key: str, text: str, frame: int = 0) -> None:
+        """Open an entry, or replace its text; an empty text closes it, because it has been explained.
 
         Args:
             key: Key of the entry, for instance `bin red_bin`.
-            text: Sentence for the result of the run.
-            position: Position `(3,)` [m], or None.
+            text: Sentence for the result of the run, or "".
             frame: Number of the frame that shows it; 0 for none.
         """
-        point = [] if position is None else round_values(position, 4)
         entry = self._entries.get(key)
-        if entry is None:
+        if not text:
+            self._close(key)
+        elif entry is None:
             self._count += 1
-            name = f"unexplained-{self._count}"
-            self._entries[key] = Entry(UnexplainedChanged(name, text, point, frame))
-        elif entry.event.text == text:
-            return
-        else:
-            entry.event = UnexplainedChanged(entry.event.name, text, point, frame)
-        self._emit(self._entries[key].event)
-
-    def withdraw(self, key: str) -> None:
-        """Close the entry with a key, if there is one, because it has been explained."""
-        entry = self._entries.pop(key, None)
-        if entry is not None:
-            event = entry.event
-            self._emit(UnexplainedChanged(event.name, event.text, event.position, is_open=False))
+            self._entries[key] = Entry(UnexplainedChanged(f"unexplained-{self._count}", text, [], frame))
+            self._emit(self._entries[key].event)
+        elif entry.event.text != text:
+            entry.event = UnexplainedChanged(entry.event.name, text, [], frame)
+            self._emit(entry.event)
 
     def observe(self, look: Detections, regions: Sequence[Region], max_distance: float) -> None:
         """Update the regions of the table with those that a look shows.
@@ -145,7 +136,7 @@ class Unexplained:
             elif look.compute_searched_mask(position[None])[0]:
                 entry.miss_count += 1
                 if entry.miss_count >= entry.look_count:
-                    self.withdraw(key)
+                    self._close(key)
         for region in new_regions:
             self._count += 1
             name = f"unexplained-{self._count}"
@@ -155,6 +146,13 @@ class Unexplained:
         self._unsettled_look_count += 1
         if all(entry.is_settled for entry in self._entries.values()):
             self._unsettled_look_count = 0
+
+    def _close(self, key: str) -> None:
+        """Close the entry with a key, if there is one."""
+        entry = self._entries.pop(key, None)
+        if entry is not None:
+            event = entry.event
+            self._emit(UnexplainedChanged(event.name, event.text, event.position, is_open=False))
 
     def _show(self, entry: Entry, region: Region, frame: int) -> None:
         """Emit an entry whose region a frame shows."""

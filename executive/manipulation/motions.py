@@ -47,16 +47,12 @@ def capture_and_detect(cell: Cell, detector: str, view: str) -> Generator[None, 
         raise SkillFailed("wrong_image", str(error)) from error
     request = cell.detectors[detector or next(iter(cell.detectors))].request(frame, view)
     # The detector searches the frame during these checks.
-    if standstill := cell.camera.describe_standstill(frame, cell.clock.now):
-        raise SkillFailed("frozen", standstill)
-    if displacement := cell.camera.describe_displacement(frame):
-        raise SkillFailed("camera_moved", displacement)
+    for reason, fault in cell.camera.find_faults(frame, cell.clock.now).items():
+        raise SkillFailed(reason, fault)
     # Both checks together exceed a control period.
     if not request.ready:
         yield
-    if view == "full" or cell.ledger.has_unconfirmed_bin():
-        cell.ledger.record_bins(cell.camera.check_bins(frame), frame)
-    cell.ledger.record_bin_contents(cell.camera.measure_bins(frame), frame)
+    cell.ledger.observe_bins(cell.camera.inspect_bins(frame), frame)
     while not request.ready:
         yield
     try:

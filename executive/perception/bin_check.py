@@ -1,4 +1,4 @@
-"""Check of each bin in a frame: do its outlines appear at the declared place, in the declared colour?
+"""Check of each bin in a frame: its declared place and colour, and what lies on its floor.
 
 The chromaticity of a colour is its RGB values divided by their sum; brightness and shading do not change it.
 """
@@ -12,10 +12,10 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from executive.cell.frame import Frame
+from executive.cell.frame import BinAppearance, Frame
 from executive.cell.objects import BIN_THICKNESS, Bin
 from executive.geometry import Array
-from executive.perception.camera_check import OutlineFitter, compute_bin_mask, smooth_image
+from executive.perception.camera_check import OutlineFitter, compute_bin_mask
 from executive.perception.camera_model import compute_hull_mask, project
 
 MIN_SUPPORT = 0.65
@@ -70,24 +70,33 @@ GREY = np.full(3, 1 / 3)
 """Chromaticity of grey."""
 
 
-def check_bins(frame: Frame, bins: Sequence[Bin]) -> dict[str, str]:
-    """Return what a frame shows of bins by name: "" for a bin that is as declared, else a contradiction.
+def inspect_bins(frame: Frame, bins: Sequence[Bin]) -> dict[str, BinAppearance]:
+    """Return what a frame shows of the bins, by name; a bin of which too little is in view is missing."""
+    contradictions = _find_contradictions(frame, bins)
+    contents = _measure_contents(frame, bins)
+    return {
+        bin.name: BinAppearance(contradictions.get(bin.name), *contents.get(bin.name, ()))
+        for bin in bins
+        if bin.name in contradictions or bin.name in contents
+    }
 
-    A bin that the frame does not show well enough is missing in the result.
-    """
+
+def _find_contradictions(frame: Frame, bins: Sequence[Bin]) -> dict[str, str]:
+    """Return "" for each bin that a frame shows as declared, and a sentence for each that it contradicts."""
     verdicts: dict[str, str] = {}
     suspects: dict[str, str] = {}
     if np.percentile(frame.image[::8, ::8].max(axis=2), 90) < MIN_BRIGHTNESS:
         return verdicts
     masks = [compute_bin_mask(frame, bin) for bin in bins]
-    supports = OutlineFitter(frame, bins).compute_bin_supports(masks)
+    fitter = OutlineFitter(frame, bins)
+    supports = fitter.compute_bin_supports(masks)
     for index, bin in enumerate(bins):
         bin_supports = supports[index]
         pixels = frame.image[masks[index] & frame.visible]
         if len(pixels) < MIN_PIXELS or (pixels >= WHITE).all(axis=1).mean() > MAX_OVEREXPOSED_FRACTION:
             continue
         if np.any(bin_supports <= MAX_CONTRADICTING_SUPPORT):
-            if place := _describe_place(frame, bin, bins):
+            if place := _describe_place(frame, fitter.image, bin, bins):
                 verdicts[bin.name] = (
                     f"{bin.name} is not at its declared place: the image shows {np.nanmin(bin_supports):.0%} "
                     f"of its outlines there, at least {MIN_SUPPORT:.0%} are required; {place}; put the bin "
@@ -105,7 +114,7 @@ def check_bins(frame: Frame, bins: Sequence[Bin]) -> dict[str, str]:
     return suspects | verdicts
 
 
-def measure_contents(frame: Frame, bins: Sequence[Bin]) -> dict[str, tuple[float, bool]]:
+def _measure_contents(frame: Frame, bins: Sequence[Bin]) -> dict[str, tuple[float, bool]]:
     """Return the area [m²] that differs from the floor, and if the whole floor is in view, by bin.
 
     A bin is missing in the result if too little of its floor is in view, or if objects cover most of it.
@@ -128,8 +137,9 @@ def measure_contents(frame: Frame, bins: Sequence[Bin]) -> dict[str, tuple[float
             floor_mask &= False if mask is None else mask
         if not floor_mask.any():
             continue
-        left, top, width, height = cv2.boundingRect(floor_mask.astype(np.uint8))
-        crop = np.s_[top : top + height, left : left + width]
+        used_rows = np.flatnonzero(floor_mask.any(axis=1))
+        used_columns = np.flatnonzero(floor_mask.any(axis=0))
+        crop = np.s_[used_rows[0] : used_rows[-1] + 1, used_columns[0] : used_columns[-1] + 1]
         shown_mask = (floor_mask & visible)[crop]
         scale = float(matrix[0, 0]) / frame.compute_depth(bin.position)
         shown_fraction = shown_mask.sum() / (4 * half_size[0] * half_size[1] * scale**2)
@@ -141,7 +151,7 @@ def measure_contents(frame: Frame, bins: Sequence[Bin]) -> dict[str, tuple[float
         opened = cv2.morphologyEx(is_different.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
         # What touches the hidden part may belong to the arm.
         hidden = cv2.dilate((~visible[crop]).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-        _, labels = cv2.connectedComponents(opened)
+        labels = cv2.connectedComponents(opened)[1]
         opened[np.isin(labels, labels[hidden])] = 0
         if opened.sum() < MAX_COVERED_FRACTION * len(colours):
             is_whole = shown_mask.sum() == floor_mask.sum() and shown_fraction > MIN_WHOLE_FRACTION
@@ -149,12 +159,12 @@ def measure_contents(frame: Frame, bins: Sequence[Bin]) -> dict[str, tuple[float
     return contents
 
 
-def _describe_place(frame: Frame, bin: Bin, bins: Sequence[Bin]) -> str:
+def _describe_place(frame: Frame, smoothed_image: NDArray[np.uint8], bin: Bin, bins: Sequence[Bin]) -> str:
     """Return a clause about the place of a bin, outside of other bins; "" near the declared place."""
     half_size = np.array([*(bin.size[:2] / 2 + BIN_THICKNESS), 0.0])
     sides = [((side, x, 0.0), (x, side, 0.0)) for side in (-1.0, 1.0) for x in RIM_FRACTIONS]
     rim = bin.position + (0.0, 0.0, bin.size[2]) + half_size * np.reshape(sides, (-1, 3))
-    edges = cv2.Canny(smooth_image(frame), *CANNY_THRESHOLDS)
+    edges = cv2.Canny(smoothed_image, *CANNY_THRESHOLDS)
     pixels_per_metre = frame.matrix[0, 0] / frame.compute_depth(rim.mean(axis=0))
     shift = np.zeros(3)
     radius = SEARCH_RADIUS
@@ -169,20 +179,18 @@ def _describe_place(frame: Frame, bin: Bin, bins: Sequence[Bin]) -> str:
         width = 2 * round(step * pixels_per_metre / 2) + 1
         near_edges = cv2.dilate(edges, np.ones((width, width), np.uint8))
         is_inside = ((pixels >= 0) & (pixels < near_edges.shape[::-1])).all(axis=1)
-        columns, rows = np.where(is_inside[:, None], pixels, 0).T
-        scores = (is_inside & (near_edges[rows, columns] > 0)).reshape(len(shifts), -1).mean(axis=1)
+        searched_pixels = np.where(is_inside[:, None], pixels, 0)
+        has_edge = near_edges[searched_pixels[:, 1], searched_pixels[:, 0]] > 0
+        scores = (is_inside & has_edge).reshape(len(shifts), -1).mean(axis=1)
         shift = shifts[int(scores.argmax())]
         radius = step
     moved = replace(bin, position=bin.position + shift)
     supports = OutlineFitter(frame, [moved]).compute_bin_supports([compute_bin_mask(frame, moved)])
     if not np.all(supports >= MIN_SUPPORT):
         return "no outline of its size is near by"
-    x, y, _ = 1e3 * shift
-    return (
-        ""
-        if np.linalg.norm(shift) <= MIN_DISPLACEMENT
-        else f"an outline of its size is ({x:+.0f}, {y:+.0f}) mm away"
-    )
+    if np.linalg.norm(shift) <= MIN_DISPLACEMENT:
+        return ""
+    return f"an outline of its size is ({1e3 * shift[0]:+.0f}, {1e3 * shift[1]:+.0f}) mm away"
 
 
 def _find_colour_owner(

@@ -12,7 +12,6 @@ import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import NamedTuple
 
 import cv2
@@ -136,11 +135,9 @@ def describe_standstill(frame: Frame, previous: Frame) -> str:
     region = (frame.visible != previous.visible) | has_camera_moved
     size = (frame.image.shape[1] // CHANGE_CELL, frame.image.shape[0] // CHANGE_CELL)
     # The means of cells have hardly any noise, and the factor removes a common change of brightness.
-    new, old, moved = (
-        cv2.resize(array, size, interpolation=cv2.INTER_AREA).astype(np.float32)
-        for array in (frame.image, previous.image, 255 * region.astype(np.uint8))
-    )
-    is_moved = moved > 127
+    new = cv2.resize(frame.image, size, interpolation=cv2.INTER_AREA).astype(np.float32)
+    old = cv2.resize(previous.image, size, interpolation=cv2.INTER_AREA).astype(np.float32)
+    is_moved = cv2.resize(255 * region.astype(np.uint8), size, interpolation=cv2.INTER_AREA) > 127
     factor = float((new * old).sum() / max(float((old * old).sum()), 1.0))
     is_changed = np.abs(new - factor * old).max(axis=-1)[is_moved] > MIN_CHANGE
     if len(is_changed) < MIN_MOVED_CELLS or is_changed.mean() >= MIN_CHANGED_FRACTION:
@@ -226,19 +223,17 @@ class PoseFit(NamedTuple):
     support: float
 
 
-@lru_cache(maxsize=1)
-def smooth_image(frame: Frame) -> NDArray[np.uint8]:
-    """Return the image of a frame after a Gaussian filter; several checks use the image of one frame."""
-    return np.asarray(cv2.GaussianBlur(frame.image, (0, 0), SMOOTHING_STD), dtype=np.uint8)
-
-
 class OutlineFitter:
-    """Fits camera poses to the edges of one frame."""
+    """Fits camera poses to the edges of one frame.
+
+    Attributes:
+        image: The image of the frame after a Gaussian filter `(H, W, 3)`.
+    """
 
     def __init__(self, frame: Frame, bins: Sequence[Bin]) -> None:
         self._frame = frame
         self._bins = bins
-        self._image = smooth_image(frame)
+        self.image = np.asarray(cv2.GaussianBlur(frame.image, (0, 0), SMOOTHING_STD), dtype=np.uint8)
 
     def refine(self, offset: Array, max_distances: Sequence[int] = FIT_EDGE_DISTANCES) -> PoseFit | None:
         """Return the fit that starts at a pose offset; None if too few samples or edges are visible.
@@ -285,7 +280,7 @@ class OutlineFitter:
     def search(self) -> Iterator[PoseFit]:
         """Yield fits that start at the poses of the search grid with the strongest edges at the outlines."""
         scale = 1 / REDUCTION
-        small_image = cv2.resize(self._image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+        small_image = cv2.resize(self.image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
         small_image = cv2.GaussianBlur(small_image, (0, 0), SMOOTHING_STD).astype(np.float32)
         derivatives = [cv2.Sobel(small_image, cv2.CV_32F, *orders) for orders in ((1, 0), (0, 1))]
         gradients = np.stack(derivatives, axis=-1)
@@ -343,7 +338,7 @@ class OutlineFitter:
         positions = (samples.pixels[:, None, None] + normal_steps + tangent_steps - 0.5).astype(np.float32)
         count, length, width, _ = positions.shape
         x, y = positions.reshape(count, length * width, 2).transpose(2, 0, 1)
-        colours = cv2.remap(self._image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        colours = cv2.remap(self.image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         profiles = colours.reshape(count, length, width, 3).astype(float).mean(axis=2)
         contrast = np.linalg.norm(np.diff(profiles, axis=1), axis=2)
         previous = contrast[:, :-2]

@@ -23,7 +23,7 @@ from executive.events import (
     RunStarted,
     TimedEvent,
 )
-from executive.ledger.certainty import is_balanced
+from executive.ledger.final_states import is_balanced
 from executive.ledger.tracker import Tracker
 from executive.manipulation.motions import make_transport_task
 from executive.manipulation.tool_goals import (

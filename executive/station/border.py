@@ -22,7 +22,7 @@ from pydantic import JsonValue
 from pydantic_core import from_json, to_json
 
 from executive import errors
-from executive.cell.frame import Answer, Detection, ErrorRates, Observation, Region
+from executive.cell.frame import Answer, BinAppearance, Detection, ErrorRates, Observation, Region
 from executive.cell.protocols import BehaviourStep
 from executive.errors import ExecutiveError, Interrupted, Stopped, to_text
 from executive.events import Emit, InputRead, ToolCommanded
@@ -167,6 +167,10 @@ OBSERVATIONS = Codec(
 REGIONS = Codec(
     lambda regions: list(map(encode_region, regions)), lambda values: list(map(decode_region, values))
 )
+BINS = Codec(
+    lambda bins: {name: list(appearance) for name, appearance in bins.items()},
+    lambda value: {name: BinAppearance(*appearance) for name, appearance in value.items()},
+)
 BEHAVIOUR_STEP = Codec(encode_behaviour_step, decode_behaviour_step)
 MOTION = Codec(attrgetter("duration"), RecordedMotion)
 """Codec of planned motions; the other codecs are named after the type that they convert."""
@@ -218,11 +222,9 @@ METHODS: Mapping[str, Input] = {
     "tool.open": COMMAND,
     "image.capture": Input("camera.image", IMAGE),
     "camera.sees_table": Input("camera.sees_table"),
-    "camera.describe_standstill": Input("camera.standstill"),
-    "camera.describe_displacement": Input("camera.displacement"),
+    "camera.find_faults": Input("camera.faults"),
     "camera.find_unexplained": Input("camera.regions", REGIONS),
-    "camera.check_bins": Input("camera.bins"),
-    "camera.measure_bins": Input("camera.contents"),
+    "camera.inspect_bins": Input("camera.bins", BINS),
     "detector.request": COMMAND,
     "request.result": Input("detector.{name}", ANSWER),
     "operator.ask": Input("operator"),

@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from executive.cell.config import CellConfig
 from executive.cell.devices import ArmDevice, CameraDevice, CameraImage
-from executive.cell.frame import Box, Detections, Frame, Region, TrueFrame
+from executive.cell.frame import BinAppearance, Box, Detections, Frame, Region, TrueFrame
 from executive.cell.objects import Bin, Obstacle
 from executive.cell.protocols import Tool
 from executive.errors import WrongImage
 from executive.geometry import Array, Pose
 from executive.motion.joints import Kinematics
-from executive.perception.bin_check import check_bins, measure_contents
+from executive.perception.bin_check import inspect_bins
 from executive.perception.camera_check import describe_displacement, describe_standstill
 from executive.perception.camera_model import BORDER_FRACTION, compute_calibration, compute_hull_mask
 from executive.perception.witness import find_unexplained
@@ -101,8 +101,10 @@ class CellCamera:
         self._table = config.table
         self._min_radius = min(section.radius for section in config.objects.values())
         self._frame_count = 0
-        self._last_capture: tuple[Frame, float] | None = None
-        """Last frame that was compared with the frame before, and the time of its capture [s]."""
+        self._last_frame: Frame | None = None
+        """Last frame that was compared with the frame before."""
+        self._last_time = 0.0
+        """Time of its capture on the clock of the run [s]."""
         self._pose_count = 0
         self._content_mask = np.ones((self.config.height, self.config.width), dtype=bool)
         """Mask `(H, W)` of the pixels that are not in the ignored border of an image with a partial view."""
@@ -153,11 +155,19 @@ class CellCamera:
             return frame
         return TrueFrame(**vars(frame), true_detections=image.true_detections)
 
-    def describe_standstill(self, frame: Frame, time: float) -> str:
-        """Return a sentence if a frame is not newer than the last frame, else ""."""
-        last_frame, last_time = self._last_capture or (frame, time)
-        self._last_capture = (frame, time)
-        if time > last_time and frame.stamp <= last_frame.stamp:
+    def find_faults(self, frame: Frame, time: float) -> dict[str, str]:
+        """Return the first fault that a frame captured at a time [s] shows, by its reason."""
+        if standstill := self._describe_standstill(frame, time):
+            return {"frozen": standstill}
+        displacement = describe_displacement(frame, self._bins) if self._is_hidden_by_arm else ""
+        return {"camera_moved": displacement} if displacement else {}
+
+    def _describe_standstill(self, frame: Frame, time: float) -> str:
+        last_frame = self._last_frame or frame
+        last_time = self._last_time
+        self._last_frame = frame
+        self._last_time = time
+        if time > last_time and frame is not last_frame and frame.stamp <= last_frame.stamp:
             stamps = f"the stamp {frame.stamp:.3f} s, and frame {last_frame.id} had {last_frame.stamp:.3f} s"
             return f"the clock of camera {self.name} stands: frame {frame.id} has {stamps}"
         has_noise = self._is_hidden_by_arm and self.config.noise.read > 0
@@ -167,23 +177,15 @@ class CellCamera:
             return ""
         return describe_standstill(frame, last_frame)
 
-    def describe_displacement(self, frame: Frame) -> str:
-        """Return a sentence if the bins in a frame are not where the declared pose shows them, else ""."""
-        return describe_displacement(frame, self._bins) if self._is_hidden_by_arm else ""
-
     def find_unexplained(self, look: Detections, obstacles: Collection[Obstacle]) -> list[Region]:
         """Return the regions of a frame that no detection and no obstacle explains; none without physics."""
         if not self._is_hidden_by_arm:
             return []
         return find_unexplained(look, self._table, self._bins, obstacles, self._min_radius)
 
-    def check_bins(self, frame: Frame) -> dict[str, str]:
-        """Return "" for each bin that a frame shows as declared, and a sentence for others in view."""
-        return check_bins(frame, self._bins) if self._is_hidden_by_arm else {}
-
-    def measure_bins(self, frame: Frame) -> dict[str, tuple[float, bool]]:
-        """Return what lies on the floors of the bins in view; nothing without physics."""
-        return measure_contents(frame, self._bins) if self._is_hidden_by_arm else {}
+    def inspect_bins(self, frame: Frame) -> dict[str, BinAppearance]:
+        """Return what a frame shows of the bins in view; nothing without physics."""
+        return inspect_bins(frame, self._bins) if self._is_hidden_by_arm else {}
 
     def _compute_pose(self, q: Array) -> Pose:
         """Return the pose `X_WC` of the camera at joint positions `q` `(n,)` [rad]."""

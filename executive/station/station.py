@@ -296,7 +296,7 @@ class Station:
         self._remove_emptied_objects()
         objects = self.driver.list_final_objects()
         gate = self.config.ledger.gate
-        ignored_positions = self.ledger.ignored_positions
+        ignored_positions = self.ledger.foreign.ignored_positions
         counts = count_outcomes(
             objects, self.ledger.records, self.cell.bins, self.routes, gate, ignored_positions
         )

@@ -6,7 +6,8 @@ from collections import UserDict
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from executive.cell.protocols import Clock, Ledger
+from executive.cell.ledger import Ledger
+from executive.cell.protocols import Clock
 from executive.events import Emit, discard_event
 from executive.tree.flow import PossibleFailure
 

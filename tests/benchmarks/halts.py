@@ -24,7 +24,7 @@ from executive.drivers.sim.arm import SimArm
 from executive.errors import ExecutiveError
 from executive.events import NodeEnded, NodeStarted, RunEnded, TimedEvent
 from executive.geometry import Array
-from executive.ledger.certainty import is_balanced
+from executive.ledger.final_states import is_balanced
 from executive.motion.joints import JointLimits
 from executive.motion.trajectory import Trajectory
 from executive.record.journal import Journal, Trace, read_journal

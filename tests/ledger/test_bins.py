@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from ledger_bench import Bench, Thing, take_frame
 
+from executive.cell.frame import BinAppearance
 from executive.cell.objects import ObjectClass
 from executive.events import ItemChanged
 
@@ -123,7 +124,7 @@ def test_two_images_name_an_object_in_a_bin_that_the_robot_did_not_bring(
     boxes: Bench, areas: list[float], text: str
 ) -> None:
     for area in areas:
-        boxes.ledger.record_bin_contents({"red_bin": (area, False)}, take_frame())
+        boxes.ledger.observe_bins({"red_bin": BinAppearance(None, area)}, take_frame())
     assert [event.text for event in boxes.ledger.unexplained.events] == [text] * bool(text)
 
 
@@ -131,9 +132,9 @@ def test_a_bin_keeps_the_objects_that_the_robot_brought(boxes: Bench) -> None:
     boxes.look(CUBE, view="full")
     boxes.place("cube-1")
     for area in (0.003, 0.0028, 0.0, 0.0028, 0.0):
-        boxes.ledger.record_bin_contents({"red_bin": (area, True)}, take_frame())
+        boxes.ledger.observe_bins({"red_bin": BinAppearance(None, area, is_whole=True)}, take_frame())
     assert not boxes.ledger.unexplained.events
-    boxes.ledger.record_bin_contents({"red_bin": (0.0, True)}, take_frame())
+    boxes.ledger.observe_bins({"red_bin": BinAppearance(None, 0.0, is_whole=True)}, take_frame())
     (event,) = boxes.ledger.unexplained.events
     assert event.text == "something left red_bin, and the robot did not do it"
 

@@ -248,7 +248,7 @@ def test_what_the_arm_ran_into_stands_on_the_table_for_five_looks() -> None:
 
 
 def test_an_ignored_object_stands_on_the_table_as_long_as_looks_show_it(bench: Bench) -> None:
-    bench.ledger.ignored_labels = ("banana",)
+    bench.ledger.foreign.ignored_labels = ("banana",)
     for _ in range(6):
         bench.look(("banana", 0.5, 0.0), ("banana", 0.5, 0.5), ("banana", 0.62, 0.0), ("cube", 0.6, 0.0))
         shown = [(each.label, round(each.position[1], 2)) for each in bench.ledger.find_objects_on_table()]

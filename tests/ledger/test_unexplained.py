@@ -56,5 +56,5 @@ def test_a_report_stays_until_it_is_withdrawn_and_is_emitted_when_it_changes() -
     look(unexplained)
     assert [event.text for event in unexplained.events] == ["b"]
     assert len(events) == 2
-    unexplained.withdraw("bin red_bin")
+    unexplained.report("bin red_bin", "")
     assert not unexplained.events

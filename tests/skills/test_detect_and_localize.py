@@ -89,7 +89,8 @@ def test_an_arm_in_the_way_may_be_looked_past(fake: FakeCell) -> None:
 
 def test_a_moved_camera_is_noticed_in_every_look(fake: FakeCell) -> None:
     for displacement, reason in (("", ""), ("camera overhead was moved", "camera_moved"), ("", "")):
-        intercept(fake, "camera.describe_displacement", Mock(return_value=displacement))
+        faults = {reason: displacement} if reason else {}
+        intercept(fake, "camera.find_faults", Mock(return_value=faults))
         result = run_skill(Detect(), fake)
         assert (result.reason, result.message) == (reason, displacement)
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from at_hand import intercept
 
+from executive.cell.frame import BinAppearance
 from executive.cell.objects import Target
 from executive.drivers.fake import FakeTool
 from executive.manipulation.tool_goals import choose_bin
@@ -212,12 +213,12 @@ def test_taken_away_while_it_lets_go_it_has_placed_what_fell(fake: FakeCell, hel
 def test_a_contradicted_bin_is_named_and_gets_no_item_until_an_image_confirms_it(
     fake: FakeCell, held: str, look: Look
 ) -> None:
-    intercept(fake, "camera.check_bins", lambda frame: {"red_bin": "red_bin is gone"})
+    intercept(fake, "camera.inspect_bins", lambda frame: {"red_bin": BinAppearance("red_bin is gone")})
     run_skill(Detect(view="full"), fake)
     result = run_skill(Transit(held=held, bin="red_bin"), fake)
     assert (result.reason, result.message) == ("bin_missing", "red_bin is gone")
     assert choose_bin(fake.cell, held) == ""
     assert [event.text for event in fake.ledger.unexplained.events] == ["red_bin is gone"]
-    intercept(fake, "camera.check_bins", lambda frame: {"red_bin": ""})
+    intercept(fake, "camera.inspect_bins", lambda frame: {"red_bin": BinAppearance("")})
     run_skill(Detect(view="full"), fake)
     assert (choose_bin(fake.cell, held), fake.ledger.unexplained.events) == ("red_bin", [])
