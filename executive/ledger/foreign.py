@@ -77,8 +77,8 @@ class ForeignObjects:
         """Record the observations with an ignored label; `targets` are the known objects on the table."""
         for entry in (each for each in observations if each.detection.label in self.ignored_labels):
             self.ignored_positions.append(entry.position)
-            left, _, right, _ = entry.detection.box
-            is_object = right - left < MAX_BODY_WIDTH * (detections.area[2] - detections.area[0])
+            box = entry.detection.box
+            is_object = box[2] - box[0] < MAX_BODY_WIDTH * (detections.area[2] - detections.area[0])
             if is_object and self._coverage.is_in_workspace(entry.position):
                 self.add(entry.position, targets)
 

@@ -4,12 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import NamedTuple
 
 from executive.cell.objects import ObjectClass
 from executive.ledger.certainty import MIN_LOG_RATIO_OF_WEIGHT, Certainty
 from executive.ledger.item import ItemRecord
 from executive.ledger.unexplained import Unexplained
 from executive.perception import evidence
+
+
+class Weighing(NamedTuple):
+    """Item whose class a weighing determined, its weight and the error of the weight [N]."""
+
+    record: ItemRecord
+    weight: float
+    std: float
 
 
 class LoadCell:
@@ -36,8 +45,7 @@ class LoadCell:
         """True if an object was weighed whose class the looks prove."""
         self._problem = ""
         """Sentence on the last object whose class the looks prove, if its weight contradicts the class."""
-        self._last_weighing: tuple[ItemRecord, float, float] | None = None
-        """Item whose class the last weighing determined, its weight and the error of the weight [N]."""
+        self._last_weighing: Weighing | None = None
 
     @property
     def assumption(self) -> str:
@@ -52,12 +60,13 @@ class LoadCell:
         self.empty_load = load
         if self._last_weighing is None:
             return
-        record, weight, std = self._last_weighing
+        last = self._last_weighing
         self._last_weighing = None
-        log_ratios = evidence.compute_weight_log_ratios(weight - shift, std, self._classes)
-        if log_ratios[record.label] < MIN_LOG_RATIO_OF_WEIGHT:
-            text = f"the load cell's zero moved by {shift:+.2f} N; {record.item} may be no {record.label}"
-            self._unexplained.report(f"weight of {record.item}", text)
+        log_ratios = evidence.compute_weight_log_ratios(last.weight - shift, last.std, self._classes)
+        if log_ratios[last.record.label] < MIN_LOG_RATIO_OF_WEIGHT:
+            item = last.record.item
+            text = f"the load cell's zero moved by {shift:+.2f} N; {item} may be no {last.record.label}"
+            self._unexplained.report(f"weight of {item}", text)
 
     def record_weight(self, record: ItemRecord, weight: float, std: float) -> str:
         """Determine the class of an item by its weight, with the standard deviation `std` [N].
@@ -79,7 +88,7 @@ class LoadCell:
         if contradiction:
             record.last_contradiction = contradiction
         else:
-            self._last_weighing = (record, weight, std)
+            self._last_weighing = Weighing(record, weight, std)
         return contradiction
 
     def _is_class_proved_by_looks(self, record: ItemRecord) -> bool:

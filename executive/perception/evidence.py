@@ -168,36 +168,42 @@ def _describe_footprint_contradiction(
     The outline is the part of the rectangle within the radius of the class. Each side of the box is at least
     that of the image of the outline at half the height, and at most that of a prism over the outline.
     """
-    half_length, half_width = np.array(object_class.footprint) / 2
+    footprint = np.array(object_class.footprint)
     angles = np.linspace(0, math.pi, 16, endpoint=False)
-    x = np.clip(object_class.radius * np.cos(angles), -half_length, half_length)
-    y = np.clip(object_class.radius * np.sin(angles), -half_width, half_width)
+    circle = object_class.radius * np.array([np.cos(angles), np.sin(angles)])
+    outline = np.clip(circle, -footprint[:, None] / 2, footprint[:, None] / 2)
     half_height = object_class.height / 2
-    rotated_x = np.cos(FOOTPRINT_YAWS)[:, None] * x - np.sin(FOOTPRINT_YAWS)[:, None] * y
-    rotated_y = np.sin(FOOTPRINT_YAWS)[:, None] * x + np.cos(FOOTPRINT_YAWS)[:, None] * y
+    cosines = np.cos(FOOTPRINT_YAWS)[:, None]
+    sines = np.sin(FOOTPRINT_YAWS)[:, None]
+    rotated_x = cosines * outline[0] - sines * outline[1]
+    rotated_y = sines * outline[0] + cosines * outline[1]
     # Centres of bottom, middle and top of the prism, and their derivatives by x and y [pixel/m].
     levels = np.array([(0.0, 0.0, -half_height), (0.0, 0.0, 0.0), (0.0, 0.0, half_height)])
     shifts = DERIVATIVE_STEP * np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0)])[:, None]
-    centres, *neighbours = project(frame.matrix, frame.X_WC, position + levels + shifts)
-    x_slope, y_slope = ((pixels - centres)[..., None, None] / DERIVATIVE_STEP for pixels in neighbours)
+    pixels = project(frame.matrix, frame.X_WC, position + levels + shifts)
+    centres = pixels[0]
+    x_slope = (pixels[1] - centres)[..., None, None] / DERIVATIVE_STEP
+    y_slope = (pixels[2] - centres)[..., None, None] / DERIVATIVE_STEP
     # The outline is symmetric to its centre. The arrays have the axes level, side of the box, and yaw.
     half_sides = np.abs(x_slope * rotated_x + y_slope * rotated_y).max(axis=-1)
     outline_sides = 2 * half_sides[1]
-    prism_sides = (centres[..., None] + half_sides).max(axis=0) - (centres[..., None] - half_sides).min(
-        axis=0
-    )
-    left, top, right, bottom = detection.box
-    sides = np.array([right - left, bottom - top])
+    highest = (centres[..., None] + half_sides).max(axis=0)
+    lowest = (centres[..., None] - half_sides).min(axis=0)
+    prism_sides = highest - lowest
+    sides = np.subtract(detection.box[2:], detection.box[:2])
     is_long_enough = sides[:, None] + SIDE_TOLERANCE_PX >= MIN_SIDE_FRACTION * outline_sides
     is_short_enough = sides[:, None] - SIDE_TOLERANCE_PX <= MAX_SIDE_FACTOR * prism_sides
     if np.any(np.all(is_long_enough & is_short_enough, axis=0)):
         return ""
-    width, height = sides * 1000 * frame.compute_depth(position) / float(frame.matrix[0, 0])
-    length, breadth = np.array(object_class.footprint) * 1000
+    size = _format_size(sides * frame.compute_depth(position) / float(frame.matrix[0, 0]))
     return (
-        f"its box is {width:.0f} x {height:.0f} mm, and a {detection.label}, {length:.0f} x {breadth:.0f} mm "
-        "from above, fits it at no yaw"
+        f"its box is {size}, and a {detection.label}, {_format_size(footprint)} from above, fits it at no yaw"
     )
+
+
+def _format_size(sides: Array) -> str:
+    """Return two lengths [m] in millimetres."""
+    return f"{sides[0] * 1000:.0f} x {sides[1] * 1000:.0f} mm"
 
 
 def is_completely_visible(detection: Detection, frame: Frame, region: Box) -> bool:

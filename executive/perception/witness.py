@@ -77,8 +77,7 @@ def find_unexplained(
         min_radius: Radius of the smallest class [m].
     """
     frame = look.frame
-    height, width = frame.visible.shape
-    size = (width // REDUCTION, height // REDUCTION)
+    size = (frame.visible.shape[1] // REDUCTION, frame.visible.shape[0] // REDUCTION)
     matrix = frame.matrix.copy()
     matrix[:2] /= REDUCTION
     searched_mask = _compute_searched_mask(frame, matrix, size, table)
@@ -113,11 +112,8 @@ def _compute_searched_mask(
     frame: Frame, matrix: Array, size: tuple[int, int], table: TableConfig
 ) -> NDArray[np.bool_] | None:
     """Return the mask of the workspace and its margin; None if a part of it is behind the camera."""
-    x_low, x_high = table.x
-    y_low, y_high = table.y
-    xs = (x_low - SEARCH_MARGIN, x_high + SEARCH_MARGIN)
-    ys = (y_low - SEARCH_MARGIN, y_high + SEARCH_MARGIN)
-    corners = np.array([(x, y, 0.0) for x in xs for y in ys])
+    margins = np.array([-SEARCH_MARGIN, SEARCH_MARGIN])
+    corners = np.array([(x, y, 0.0) for x in table.x + margins for y in table.y + margins])
     return compute_hull_mask(corners, matrix, frame.X_WC, size, may_be_cut=True)
 
 
@@ -152,9 +148,8 @@ def _find_deviations(
 
 def _find_raised(frame: Frame, depth: Array) -> NDArray[np.bool_]:
     """Return the mask `(H, W)` of the reduced pixels that a depth image shows above the table."""
-    height, width = depth.shape
-    columns = np.arange(REDUCTION // 2, width, REDUCTION)
-    rows = np.arange(REDUCTION // 2, height, REDUCTION)
+    columns = np.arange(REDUCTION // 2, depth.shape[1], REDUCTION)
+    rows = np.arange(REDUCTION // 2, depth.shape[0], REDUCTION)
     heights = compute_heights(frame, depth, columns, rows)
     is_known = np.isfinite(heights)
     window = (DEPTH_WINDOW, DEPTH_WINDOW)
@@ -182,9 +177,9 @@ def _make_region(frame: Frame, box: Box) -> Region:
     centre = ((left + right) / 2, (top + bottom) / 2)
     position = intersect_plane(frame.matrix, frame.X_WC, centre, UNKNOWN_HALF_HEIGHT)
     scale = 1000 * frame.compute_depth(position) / float(frame.matrix[0, 0])
-    x, y, _ = position
+    place = f"({position[0]:.2f}, {position[1]:.2f}) m"
     size = f"{(right - left) * scale:.0f} x {(bottom - top) * scale:.0f} mm"
-    text = f"something of {size} at ({x:.2f}, {y:.2f}) m that no item explains, unlike the table around it"
+    text = f"something of {size} at {place} that no item explains, unlike the table around it"
     return Region((left, top, right, bottom), position, text)
 
 
@@ -198,6 +193,6 @@ def _list_cylinder_points(obstacle: Obstacle) -> Array:
 
 def _fill_box(mask: NDArray[np.uint8], box: Box) -> None:
     """Set the reduced pixels of a box [pixel] and its margin."""
-    left, top = (int(max(side - BOX_MARGIN, 0) / REDUCTION) for side in box[:2])
-    right, bottom = (math.ceil(max(side + BOX_MARGIN, 0) / REDUCTION) for side in box[2:])
-    mask[top:bottom, left:right] = 1
+    start = np.maximum(np.floor(np.subtract(box[:2], BOX_MARGIN) / REDUCTION), 0).astype(int)
+    end = np.maximum(np.ceil(np.add(box[2:], BOX_MARGIN) / REDUCTION), 0).astype(int)
+    mask[start[1] : end[1], start[0] : end[0]] = 1
