@@ -166,7 +166,8 @@ def _describe_footprint_contradiction(
     """Return a sentence if no yaw of the footprint fits both sides of a box, otherwise "".
 
     The outline is the part of the rectangle within the radius of the class. Each side of the box is at least
-    that of the image of the outline at half the height, and at most that of a prism over the outline.
+    that of the image of the outline at half the height, and at most that of a prism over the outline. The box
+    of an object that stands on another one may contain the other one, if both have the same colour.
     """
     footprint = np.array(object_class.footprint)
     angles = np.linspace(0, math.pi, 16, endpoint=False)
@@ -177,8 +178,13 @@ def _describe_footprint_contradiction(
     sines = np.sin(FOOTPRINT_YAWS)[:, None]
     rotated_x = cosines * outline[0] - sines * outline[1]
     rotated_y = sines * outline[0] + cosines * outline[1]
-    # Centres of bottom, middle and top of the prism, and their derivatives by x and y [pixel/m].
-    levels = np.array([(0.0, 0.0, -half_height), (0.0, 0.0, 0.0), (0.0, 0.0, half_height)])
+    # Centres of bottom, middle and top of the prism, and of what is below, and their derivatives by x and y
+    # [pixel/m].
+    heights = [-half_height, 0.0, half_height]
+    is_on_other_object = position[2] - half_height > TOP_TOLERANCE
+    if is_on_other_object:
+        heights.append(-position[2])
+    levels = np.array([(0.0, 0.0, height) for height in heights])
     shifts = DERIVATIVE_STEP * np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0)])[:, None]
     pixels = project(frame.matrix, frame.X_WC, position + levels + shifts)
     centres = pixels[0]
@@ -186,6 +192,8 @@ def _describe_footprint_contradiction(
     y_slope = (pixels[2] - centres)[..., None, None] / DERIVATIVE_STEP
     # The outline is symmetric to its centre. The arrays have the axes level, side of the box, and yaw.
     half_sides = np.abs(x_slope * rotated_x + y_slope * rotated_y).max(axis=-1)
+    if is_on_other_object:
+        half_sides[3] = object_class.radius * np.hypot(x_slope, y_slope)[3, ..., 0]
     outline_sides = 2 * half_sides[1]
     highest = (centres[..., None] + half_sides).max(axis=0)
     lowest = (centres[..., None] - half_sides).min(axis=0)
