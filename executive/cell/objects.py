@@ -139,6 +139,12 @@ class ObjectClass:
         return sorted({self.height + support_height for support_height in self.support_heights})
 
     @property
+    def outline_area(self) -> float:
+        """Area of the outline, seen from above [m²]; an upper limit, if the footprint is known."""
+        circle_area = math.pi * self.radius**2
+        return circle_area if self.footprint is None else min(circle_area, math.prod(self.footprint))
+
+    @property
     def detected_label(self) -> str:
         """Class whose label the detectors report for objects of this class."""
         return self.looks_like or self.label
