@@ -57,11 +57,13 @@ class BinView:
     Attributes:
         items: Items in the bin according to the ledger, with their classes.
         area: Area that differs from the floor [m²].
-        change: Sentence on a change that one image showed, or "".
+        suspect: A later image that showed more or less than the robot brought, or None.
+        change: Sentence on what the suspect image showed, or "".
     """
 
     items: BinItems = field(default_factory=dict)
     area: float = 0.0
+    suspect: BinView | None = None
     change: str = ""
 
 
@@ -227,7 +229,6 @@ class BinContents:
             return changes
         held_items = self.records.filter_by_state(State.HELD)
         target_bins = {name for item in held_items for name in self.routes.get(item.label, ())}
-        min_change = MIN_CHANGED_FRACTION * math.pi * min(each.radius for each in self.classes.values()) ** 2
         for name, (_, area, is_whole) in appearances.items():
             # The tool may have released a held item just now.
             if area is None or name in target_bins:
@@ -235,42 +236,45 @@ class BinContents:
             records = self.list_records_in(name)
             items = {record.item: self.classes[record.label] for record in records}
             view = self.views.setdefault(name, BinView())
-            low, high = self.predict_growth(name, view.items, items, min_change)
-            verb = ""
-            if area - view.area > high:
-                verb = "came into"
-            elif is_whole and area - view.area < low:
-                verb = "left"
-            if is_whole and not items and area < min_change:
+            new_view = BinView(items, area)
+            verb = self.find_change(name, view, new_view, is_whole=is_whole)
+            if is_whole and not items and area < self.min_change:
                 self.known_bins.add(name)
             change = f"something {verb} {name}, and the robot did not do it" if verb else ""
             if change and change == view.change:
                 changes[name] = change
-                change = ""
-            elif verb or not is_whole:
-                # One image may show the shadow of the arm, and a partial view less than before.
-                view.change = change or view.change
-                continue
-            self.views[name] = BinView(items, area) if is_whole else view
+            elif change:
+                # One image may show the shadow of the arm.
+                view.suspect = new_view
+                view.change = change
+            # An object that the robot brought may hide the difference between the suspect view and its base.
+            is_ambiguous = view.suspect and not self.find_change(name, view.suspect, new_view, is_whole=True)
+            if is_whole and (name in changes or not (change or is_ambiguous)):
+                self.views[name] = new_view
         return changes
 
-    def predict_growth(
-        self, bin_name: str, items: BinItems, new_items: BinItems, min_change: float
-    ) -> tuple[float, float]:
-        """Return the least and the greatest growth of the visible area [m²] between two sets of items.
+    @property
+    def min_change(self) -> float:
+        """Least change of the visible area that an image proves, if the robot brought nothing [m²]."""
+        return MIN_CHANGED_FRACTION * math.pi * min(each.radius for each in self.classes.values()) ** 2
 
-        An item on others hides them. `min_change` is the least change that an image proves [m²].
+    def find_change(self, bin_name: str, old: BinView, new: BinView, *, is_whole: bool) -> str:
+        """Return what happened to something between two views that no item explains; "" for nothing.
+
+        If the new view is not whole, it may show less than lies in the bin.
         """
-        added = [new_items[item] for item in new_items.keys() - items.keys()]
-        removed = [items[item] for item in items.keys() - new_items.keys()]
-        free_count = max(0, len(self.bins[bin_name].slots) - len(items))
+        added = [new.items[item] for item in new.items.keys() - old.items.keys()]
+        removed = [old.items[item] for item in old.items.keys() - new.items.keys()]
+        # An item on others hides them.
+        free_count = max(0, len(self.bins[bin_name].slots) - len(old.items))
         lows = sorted(MIN_AREA_FACTOR * each.outline_area for each in added)[:free_count]
-        highs = [MAX_AREA_FACTOR * math.pi * each.radius**2 for each in added]
-        low = sum(lows) - (0.0 if lows else min_change)
-        high = sum(highs) + min_change
-        low -= sum(MAX_AREA_FACTOR * math.pi * each.radius**2 for each in removed)
+        low = sum(lows) - sum(MAX_AREA_FACTOR * math.pi * each.radius**2 for each in removed)
+        high = sum(MAX_AREA_FACTOR * math.pi * each.radius**2 for each in added)
         high -= sum(MIN_AREA_FACTOR * each.outline_area for each in removed)
-        return low, high
+        growth = new.area - old.area
+        if growth > high + (0.0 if added else self.min_change):
+            return "came into"
+        return "left" if is_whole and growth < low - (0.0 if lows else self.min_change) else ""
 
     def discard_items_left_behind(self) -> dict[str, str]:
         """Discard placed items that looks show where they were picked, and return a sentence on each."""

@@ -56,6 +56,8 @@ REDUCTION = 2
 """Factor that reduces the size of the image for the measurement of contents."""
 FLOOR_MARGIN = 0.008
 """Distance of the measured part of a floor from the walls [m]."""
+ARM_MARGIN = 0.04
+"""Maximum distance of parts of the arm from its part of an image, on the floor of a bin [m]."""
 MIN_CONTENT_CONTRAST = 14.0
 """Minimum deviation of an object in a bin from the colour of the floor [grey level]."""
 MIN_SHOWN_FRACTION = 0.5
@@ -137,11 +139,17 @@ def _measure_contents(frame: Frame, bins: Sequence[Bin]) -> dict[str, tuple[floa
             floor_mask &= False if mask is None else mask
         if not floor_mask.any():
             continue
+        scale = float(matrix[0, 0]) / frame.compute_depth(bin.position)
+        margin = round(ARM_MARGIN * scale)
         used_rows = np.flatnonzero(floor_mask.any(axis=1))
         used_columns = np.flatnonzero(floor_mask.any(axis=0))
-        crop = np.s_[used_rows[0] : used_rows[-1] + 1, used_columns[0] : used_columns[-1] + 1]
-        shown_mask = (floor_mask & visible)[crop]
-        scale = float(matrix[0, 0]) / frame.compute_depth(bin.position)
+        rows = slice(max(0, used_rows[0] - margin), used_rows[-1] + margin + 1)
+        columns = slice(max(0, used_columns[0] - margin), used_columns[-1] + margin + 1)
+        crop = np.s_[rows, columns]
+        kernel = np.ones((2 * margin + 1, 2 * margin + 1), np.uint8)
+        hidden = cv2.dilate((~visible[crop]).astype(np.uint8), kernel) > 0
+        floor_mask = floor_mask[crop]
+        shown_mask = floor_mask & ~hidden
         shown_fraction = shown_mask.sum() / (4 * half_size[0] * half_size[1] * scale**2)
         colours = image[crop][shown_mask]
         if shown_fraction < MIN_SHOWN_FRACTION:
@@ -150,9 +158,9 @@ def _measure_contents(frame: Frame, bins: Sequence[Bin]) -> dict[str, tuple[floa
         is_different = shown_mask & (deviations > MIN_CONTENT_CONTRAST)
         opened = cv2.morphologyEx(is_different.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
         # What touches the hidden part may belong to the arm.
-        hidden = cv2.dilate((~visible[crop]).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+        border = cv2.dilate(hidden.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
         labels = cv2.connectedComponents(opened)[1]
-        opened[np.isin(labels, labels[hidden])] = 0
+        opened[np.isin(labels, labels[border])] = 0
         if opened.sum() < MAX_COVERED_FRACTION * len(colours):
             is_whole = shown_mask.sum() == floor_mask.sum() and shown_fraction > MIN_WHOLE_FRACTION
             contents[bin.name] = (round(float(opened.sum() / scale**2), 5), bool(is_whole))
