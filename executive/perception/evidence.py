@@ -9,12 +9,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+import cv2
 import numpy as np
+from numpy.typing import NDArray
 
-from executive.cell.frame import Box, Detection, Frame
+from executive.cell.frame import Box, Detection, Detections, Frame
 from executive.cell.objects import ObjectClass
 from executive.errors import NoDepth
-from executive.geometry import GRAVITY, Array
+from executive.geometry import GRAVITY, Array, rotate_about_z
 from executive.perception.camera_model import measure_top_height, project
 
 TOP_TOLERANCE = 0.012
@@ -40,6 +42,8 @@ DERIVATIVE_STEP = 0.01
 """Distance from the centre of an object at which the derivatives of its image are computed [m]."""
 FOOTPRINT_YAWS = np.radians(np.arange(0.0, 180.0, 5.0))
 """Yaws at which the footprint of a class is compared with a box `(36,)` [rad]."""
+OUTLINE_YAWS = np.concatenate([FOOTPRINT_YAWS[0::3], FOOTPRINT_YAWS[1::3], FOOTPRINT_YAWS[2::3]])
+"""The same yaws, in an order in which one that fits well enough comes early `(36,)` [rad]."""
 MIN_SIDE_FRACTION = 0.85
 """Minimum side of a box, as a fraction of the same side of the image of the footprint of its class."""
 MAX_SIDE_FACTOR = 1.07
@@ -53,6 +57,16 @@ detections; boxes of a detector on real bricks were not measured.
 """
 SIDE_TOLERANCE_PX = 1.5
 """Maximum additional difference between a side of a box and the sides that the footprint allows [pixel]."""
+MIN_OUTLINE_CONTRAST = 20.0
+"""Minimum deviation of a pixel of an object from the table around it [grey level]."""
+MIN_OUTLINE_STDS = 4.0
+"""Minimum deviation of a pixel of an object from the table around it, in standard deviations of the table."""
+MIN_OVERLAP = 0.75
+"""Minimum common part of the outlines of an object and its class, as a fraction of their union.
+
+In 40 declared runs of five missions, one of 684 detections of cubes had less, beside the moving arm. Bricks
+of 80 x 50, 90 x 50 and 70 x 35 mm had 0.58 to 0.70.
+"""
 MIN_BORDER_DISTANCE = 2.0
 """Minimum distance of a completely visible box from the border of the searched region [pixel]."""
 
@@ -207,6 +221,84 @@ def _describe_footprint_contradiction(
     return (
         f"its box is {size}, and a {detection.label}, {_format_size(footprint)} from above, fits it at no yaw"
     )
+
+
+def describe_outline_contradiction(
+    look: Detections, detection: Detection, position: Array, object_class: ObjectClass
+) -> str:
+    """Return a sentence if an object does not look like a prism over the footprint of its class, else "".
+
+    The outline of the object is that of the connected pixels that differ from the table, outside of the boxes
+    of other detections. The result is also "" for an object on another one, and if the contrast is too small.
+
+    Args:
+        look: The detections with their frame.
+        detection: Completely visible box and detected class.
+        position: Centre of the object `(3,)` [m].
+        object_class: The detected class, with a footprint.
+    """
+    if position[2] - object_class.height / 2 > TOP_TOLERANCE:
+        return ""
+    frame = look.frame
+    outline, is_free, corner = _find_outline(look, detection)
+    length, width = np.array(object_class.footprint) / 2
+    rectangle = np.array([(length, width, 0), (-length, width, 0), (-length, -width, 0), (length, -width, 0)])
+    half_height = np.array([0.0, 0.0, object_class.height / 2])
+    outline_area = cv2.countNonZero(outline)
+    best_overlap = 0.0
+    for yaw in OUTLINE_YAWS:
+        rotated = rectangle @ rotate_about_z(yaw).T
+        prism = position + np.concatenate([rotated - half_height, rotated + half_height])
+        pixels = (project(frame.matrix, frame.X_WC, prism) - corner).round().astype(np.int32)
+        expected = np.zeros_like(outline)
+        cv2.fillConvexPoly(expected, cv2.convexHull(pixels), 1)
+        whole_area = cv2.countNonZero(expected)
+        expected &= is_free
+        expected_area = cv2.countNonZero(expected)
+        if outline_area < MIN_OVERLAP * expected_area or expected_area < MIN_OVERLAP * whole_area:
+            return ""
+        overlap = cv2.countNonZero(expected & outline) / cv2.countNonZero(expected | outline)
+        if overlap >= MIN_OVERLAP:
+            return ""
+        best_overlap = max(best_overlap, overlap)
+    return f"its outline and that of a {detection.label} have {best_overlap:.0%} of their area in common"
+
+
+def _find_outline(
+    look: Detections, detection: Detection
+) -> tuple[NDArray[np.uint8], NDArray[np.uint8], NDArray[np.int_]]:
+    """Return a mask of an object, a mask of the pixels outside of other boxes, and their left upper corner.
+
+    The first mask is the convex hull of the connected pixels at the centre of the box that differ from the
+    table around it. Both masks cover the box and its surroundings, with a width of half its longer side.
+    """
+    frame = look.frame
+    box = np.array(detection.box)
+    margin = (box[2:] - box[:2]).max() / 2
+    corner = np.maximum(np.floor(box[:2] - margin), 0).astype(int)
+    end = np.ceil(box[2:] + margin).astype(int)
+    crop = np.s_[corner[1] : end[1], corner[0] : end[0]]
+    image = frame.image[crop].astype(np.int16)
+    is_free = frame.visible[crop].astype(np.uint8)
+    for other in (*look.confident, *look.doubtful, *look.unknown):
+        if other is not detection:
+            other_box = np.maximum(np.reshape(other.box, (2, 2)) - corner, 0).round().astype(int)
+            is_free[other_box[0, 1] : other_box[1, 1], other_box[0, 0] : other_box[1, 0]] = 0
+    is_table = is_free > 0
+    inner_box = np.maximum(np.reshape(box, (2, 2)) - corner, 0).round().astype(int)
+    is_table[inner_box[0, 1] : inner_box[1, 1], inner_box[0, 0] : inner_box[1, 0]] = False
+    outline = np.zeros_like(is_free)
+    if not is_table.any():
+        return outline, is_free, corner
+    deviations = np.abs(image - np.median(image[is_table], axis=0)).max(axis=2)
+    noise = 1.4826 * float(np.median(deviations[is_table]))
+    mask = (deviations > max(MIN_OUTLINE_CONTRAST, MIN_OUTLINE_STDS * noise)).astype(np.uint8) & is_free
+    labels = cv2.connectedComponents(cv2.morphologyEx(mask, cv2.MORPH_OPEN, np.ones((3, 3))))[1]
+    column, row = (np.array(detection.centre) - corner).astype(int)
+    if labels[row, column]:
+        points = cv2.findNonZero((labels == labels[row, column]).astype(np.uint8))
+        cv2.fillConvexPoly(outline, cv2.convexHull(points), 1)
+    return outline & is_free, is_free, corner
 
 
 def _format_size(sides: Array) -> str:

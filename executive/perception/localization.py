@@ -95,10 +95,14 @@ class CellLocalizer:
         if not is_visible or any(bin.contains(position, BIN_THICKNESS) for bin in self.bins):
             return ""
         object_class = self.classes[detection.label]
-        size_contradiction = evidence.describe_size_contradiction(detection, position, frame, object_class)
-        return size_contradiction or evidence.describe_top_contradiction(
+        contradiction = evidence.describe_size_contradiction(detection, position, frame, object_class)
+        contradiction = contradiction or evidence.describe_top_contradiction(
             detection, position, frame, object_class
         )
+        # The outline of a class with a round or uneven top is no prism.
+        if contradiction or not (object_class.footprint and object_class.flat_top):
+            return contradiction
+        return evidence.describe_outline_contradiction(detections, detection, position, object_class)
 
     def _find_height(self, detection: Detection, frame: Frame) -> float:
         """Return the height of the centre of a detected object [m].
