@@ -132,9 +132,12 @@ def _measure_contents(frame: Frame, bins: Sequence[Bin]) -> dict[str, tuple[floa
         half_size = np.array([*(bin.size[:2] / 2 - FLOOR_MARGIN), 0.0])
         rectangle = bin.position + half_size * [(1, 1, 0), (1, -1, 0), (-1, -1, 0), (-1, 1, 0)]
         floor_mask = np.ones(visible.shape, dtype=bool)
+        is_cut = False
         # The camera sees the floor through the opening of the bin.
         for height in (BIN_THICKNESS, bin.size[2]):
             polygon = rectangle + up * height
+            pixels = project(matrix, frame.X_WC, polygon)
+            is_cut |= bool(np.any((pixels < 0) | (pixels > size)))
             mask = compute_hull_mask(polygon, matrix, frame.X_WC, size, may_be_cut=True)
             floor_mask &= False if mask is None else mask
         if not floor_mask.any():
@@ -162,8 +165,8 @@ def _measure_contents(frame: Frame, bins: Sequence[Bin]) -> dict[str, tuple[floa
         labels = cv2.connectedComponents(opened)[1]
         opened[np.isin(labels, labels[border])] = 0
         if opened.sum() < MAX_COVERED_FRACTION * len(colours):
-            is_whole = shown_mask.sum() == floor_mask.sum() and shown_fraction > MIN_WHOLE_FRACTION
-            contents[bin.name] = (round(float(opened.sum() / scale**2), 5), bool(is_whole))
+            is_hidden = shown_mask.sum() < floor_mask.sum() or shown_fraction <= MIN_WHOLE_FRACTION
+            contents[bin.name] = (round(float(opened.sum() / scale**2), 5), not (is_cut or is_hidden))
     return contents
 
 
