@@ -81,7 +81,9 @@ def test_a_camera_on_the_wrist_sees_the_table_from_its_scan_poses_and_locates_tr
 ) -> None:
     fake = FakeCell(load("wrist"), seed=1)
     assert fake.cell.camera.name == "wrist"
-    assert not fake.cell.camera.sees_table(), "home is no scan pose"
+    assert fake.cell.camera.sees_table(), "home is a scan pose"
+    assert run_skill(MoveToScan(pose="left_half"), fake).status == "SUCCESS"
+    assert not fake.cell.camera.sees_table()
     assert run_skill(MoveToScan(pose=pose), fake).status == "SUCCESS"
     assert fake.cell.camera.sees_table()
     detections: Detections = run_skill(Detect(), fake).outputs["detections"]

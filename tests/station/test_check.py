@@ -78,7 +78,7 @@ def test_a_scan_pose_without_a_view_of_it_all_is_found(overhead: CellConfig, wri
             'in the pose "aside" the arm hides a part of the workspace from the camera overhead',
         )
     ]
-    turned = (40.0, *wrist.arm.poses_deg["scan"][1:])
+    turned = (80.0, *wrist.arm.poses_deg["scan"][1:])
     assert [key for key, _ in find_pose_errors(posed(wrist, scan=turned))] == [
         ("cameras", "wrist", "scan_poses", 0)
     ]
@@ -116,7 +116,7 @@ def changed(cell: str, **values: Any) -> CellConfig:
         ("overhead", {"fov_deg": 170}, ["fov_deg"], "1.0 pixels"),
         ("depth", {"calibration": INVERSE}, ["calibration"], "exchange"),
         ("depth", {"calibration": INVERSE.replace("-2.2214, 0]", "-2, 0.3]")}, ["table_view"], "exchange"),
-        ("wrist", {"scan_poses": "[scan, home]"}, ["scan_poses", 1], 'from the pose "home"'),
+        ("wrist", {"scan_poses": "[scan, left_half]"}, ["scan_poses", 1], 'from the pose "left_half"'),
         ("wrist_halves", {"scan_poses": "[left_half]"}, ["scan_poses"], "y -0.22 to -0.02 m"),
         ("wrist_halves", {"partial_views": "false"}, ["scan_poses", 0], 'from the pose "left_half"'),
         ("wrist_halves", {"table_view": [0, 0, 64, 64]}, ["table_view"], "correct"),

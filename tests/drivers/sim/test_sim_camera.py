@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,11 +10,14 @@ import pytest
 from executive.cell.config import CellConfig
 from executive.cell.device_config import DepthConfig
 from executive.cell.devices import StepClock
+from executive.cell.frame import BinAppearance
 from executive.drivers.sim.camera import CELL_LIGHT, SimCamera, add_depth_noise, get_camera_pose, render
 from executive.drivers.sim.models import load_mesh
 from executive.drivers.sim.world import World
 from executive.geometry import Pose, rotate_about_z
+from executive.motion.joints import build_kinematics
 from executive.perception.camera_model import compute_calibration, project
+from executive.station.camera import CellCamera, Robot
 
 Build = Callable[[CellConfig], World]
 
@@ -119,3 +124,20 @@ def test_pixels_drop_out_beside_edges_and_a_few_anywhere() -> None:
     assert np.isnan(add_depth_noise(smaller, config, np.random.default_rng(1))).mean() == pytest.approx(
         0.01, abs=0.005
     )
+
+
+@pytest.mark.parametrize("pose", ["scan", "scan_left", "scan_right"])
+def test_the_scan_poses_of_the_wrist_camera_show_the_floors_of_all_bins(
+    build: Build, wrist: CellConfig, pose: str
+) -> None:
+    world = build(wrist)
+    q = np.radians(wrist.arm.poses_deg[pose])
+    world.set_joint_positions(q)
+    (name,) = wrist.cameras
+    still: Any = SimpleNamespace(q=q, holding=False)
+    robot = Robot(still, still)
+    device = SimCamera(world, wrist, StepClock(step=1.5), 0, CELL_LIGHT)
+    bins = wrist.build_bins().values()
+    camera = CellCamera(wrist, name, device, robot, robot, build_kinematics(wrist), bins=bins)
+    appearances = camera.inspect_bins(camera.capture())
+    assert appearances == dict.fromkeys(wrist.bins, BinAppearance("", 0.0, is_whole=True))
