@@ -57,7 +57,7 @@ REDUCTION = 2
 FLOOR_MARGIN = 0.008
 """Distance of the measured part of a floor from the walls [m]."""
 ARM_MARGIN = 0.04
-"""Maximum distance of parts of the arm from its part of an image, on the floor of a bin [m]."""
+"""Maximum distance by which the arm exceeds the spheres that stand for it in `Frame.visible` [m]."""
 MIN_CONTENT_CONTRAST = 14.0
 """Minimum deviation of an object in a bin from the colour of the floor [grey level]."""
 MIN_SHOWN_FRACTION = 0.5
@@ -74,6 +74,12 @@ GREY = np.full(3, 1 / 3)
 
 def inspect_bins(frame: Frame, bins: Sequence[Bin]) -> dict[str, BinAppearance]:
     """Return what a frame shows of the bins, by name; a bin of which too little is in view is missing."""
+    if not bins:
+        return {}
+    depth = min(frame.compute_depth(bin.position) for bin in bins)
+    side = 2 * round(ARM_MARGIN * float(frame.matrix[0, 0]) / max(depth, ARM_MARGIN)) + 1
+    visible = cv2.erode(frame.visible.astype(np.uint8), np.ones((side, side), np.uint8)) > 0
+    frame = replace(frame, visible=visible)
     contradictions = _find_contradictions(frame, bins)
     contents = _measure_contents(frame, bins)
     return {
@@ -143,16 +149,11 @@ def _measure_contents(frame: Frame, bins: Sequence[Bin]) -> dict[str, tuple[floa
         if not floor_mask.any():
             continue
         scale = float(matrix[0, 0]) / frame.compute_depth(bin.position)
-        margin = round(ARM_MARGIN * scale)
         used_rows = np.flatnonzero(floor_mask.any(axis=1))
         used_columns = np.flatnonzero(floor_mask.any(axis=0))
-        rows = slice(max(0, used_rows[0] - margin), used_rows[-1] + margin + 1)
-        columns = slice(max(0, used_columns[0] - margin), used_columns[-1] + margin + 1)
-        crop = np.s_[rows, columns]
-        kernel = np.ones((2 * margin + 1, 2 * margin + 1), np.uint8)
-        hidden = cv2.dilate((~visible[crop]).astype(np.uint8), kernel) > 0
+        crop = np.s_[used_rows[0] : used_rows[-1] + 1, used_columns[0] : used_columns[-1] + 1]
         floor_mask = floor_mask[crop]
-        shown_mask = floor_mask & ~hidden
+        shown_mask = floor_mask & visible[crop]
         shown_fraction = shown_mask.sum() / (4 * half_size[0] * half_size[1] * scale**2)
         colours = image[crop][shown_mask]
         if shown_fraction < MIN_SHOWN_FRACTION:
@@ -161,9 +162,9 @@ def _measure_contents(frame: Frame, bins: Sequence[Bin]) -> dict[str, tuple[floa
         is_different = shown_mask & (deviations > MIN_CONTENT_CONTRAST)
         opened = cv2.morphologyEx(is_different.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
         # What touches the hidden part may belong to the arm.
-        border = cv2.dilate(hidden.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+        hidden = cv2.dilate((~visible[crop]).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
         labels = cv2.connectedComponents(opened)[1]
-        opened[np.isin(labels, labels[border])] = 0
+        opened[np.isin(labels, labels[hidden])] = 0
         if opened.sum() < MAX_COVERED_FRACTION * len(colours):
             is_hidden = shown_mask.sum() < floor_mask.sum() or shown_fraction <= MIN_WHOLE_FRACTION
             contents[bin.name] = (round(float(opened.sum() / scale**2), 5), not (is_cut or is_hidden))
