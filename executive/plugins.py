@@ -207,13 +207,19 @@ def _read_project(file: Path) -> Project:
     if len(text) > MAX_PROJECT_LENGTH or text.count(".") > MAX_DOT_COUNT:
         raise InputError(f"{file} has more than {MAX_PROJECT_LENGTH} characters or {MAX_DOT_COUNT} dots")
     try:
-        content = tomllib.loads(text)
+        content = _parse_toml(text)
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise InputError(f"{file} is not valid TOML: {error}; the file registers plugins") from None
     table = content.get("project", {})
     if not isinstance(table, dict):
         raise InputError(f"{file}: project is not a table; begin it with a line [project]")
     return Project(file, str(table.get("name", "")), table)
+
+
+@functools.lru_cache(maxsize=1)
+def _parse_toml(text: str) -> Mapping[str, Any]:
+    """Return the content of a text; cached, because each look-up of plugins reads the same file."""
+    return tomllib.loads(text)
 
 
 @functools.cache
