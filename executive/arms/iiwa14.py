@@ -50,6 +50,15 @@ _FLIP_SIGNS = np.ones((8, 7))
 _FLIP_SIGNS[:, [1, 3, 5]] = FLIPS
 _ROUNDING_ERROR = 1e-9  # [m]
 
+_LENGTHS = {3: UPPER_ARM, 5: FOREARM}
+"""Length of the link before a joint [m], by index of the joint."""
+_AXES = np.array([[0, 0, 1], [0, 1, 0], [0, 0, 1], [0, -1, 0], [0, 0, 1], [0, 1, 0], [0, 0, 1]])
+"""Axis of each joint in the frame before the joint."""
+# Matrices `(7, 3, 3)` that map a vector to its part along the axis, to the rest, and to its cross product.
+_PARALLEL_PARTS = _AXES[:, :, None] * _AXES[:, None]
+_NORMAL_PARTS = np.eye(3) - _PARALLEL_PARTS
+_CROSS_PRODUCTS = np.cross(_AXES[:, None], np.eye(3)).swapaxes(1, 2)
+
 
 def interpolate_max_joint_6_angle(min_link_distance: float) -> float:
     """Return the maximum angle of joint 6 [rad] at which links 5 and 7 keep a minimum distance [m].
@@ -200,19 +209,15 @@ class Iiwa14:
 
     def _compute_frames(self, q: ArrayLike) -> list[Pose]:
         """Return the frames of joints 1 to 7 at `q` `(7,)` [rad], followed by the frame of the tool."""
+        angles = np.asarray(q, dtype=float)[:, None, None]
+        # Rodrigues' formula.
+        joint_rotations = _PARALLEL_PARTS + np.cos(angles) * _NORMAL_PARTS + np.sin(angles) * _CROSS_PRODUCTS
         frames = []
         R = np.eye(3)
         p = np.array([0.0, 0.0, SHOULDER_HEIGHT])
-        lengths = {3: UPPER_ARM, 5: FOREARM}  # [m] before the joint with this index
-        angles = np.asarray(q, dtype=float) * (1, 1, 1, -1, 1, 1, 1)
-        cosines = np.cos(angles)
-        sines = np.sin(angles)
-        joint_rotations = np.tile(np.eye(3), (len(angles), 1, 1))
-        for parity in (0, 1):
-            joints = slice(parity, None, 2)
-            _rotate(joint_rotations[joints].transpose(1, 2, 0), cosines[joints], sines[joints], parity)
         for joint, R_joint in enumerate(joint_rotations):
-            p = p + lengths.get(joint, 0.0) * R[:, 2]
+            if length := _LENGTHS.get(joint):
+                p = p + length * R[:, 2]
             R = R @ R_joint
             frames.append(Pose(R, p))
         return [*frames, Pose(R, p + self._wrist_to_tool * R[:, 2])]
