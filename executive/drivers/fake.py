@@ -159,6 +159,8 @@ class FakeArm:
         self.next_obstacle: str | None = None
         self.commands: list[str] = []
         self._kinematics = build_planning_kinematics(config)
+        self._q_of_pose = self.q
+        self._tool_pose = self._kinematics.compute_tool_pose(self.q)
         self._world = world
         self._tool_model = config.tool
         self._path: list[Array] = []
@@ -178,7 +180,11 @@ class FakeArm:
     @property
     def tool_pose(self) -> Pose:
         """Pose of the tool centre point in the world."""
-        return self._kinematics.compute_tool_pose(self.q)
+        # In a control step, several devices need the pose of the same joint positions.
+        if self._q_of_pose is not self.q:
+            self._tool_pose = self._kinematics.compute_tool_pose(self.q)
+            self._q_of_pose = self.q
+        return self._tool_pose
 
     def execute(self, motion: Motion, guard: MotionGuard) -> None:
         step_count = math.ceil(motion.duration / STEP - MAX_STEP_ERROR)

@@ -93,11 +93,11 @@ class FakeWorld:
         """Return the object that a tool at `tip_position` `(3,)` [m] touches from above, or None."""
         for fake_object in self.objects:
             object_class = self.classes[fake_object.label]
-            distance = float(np.linalg.norm(fake_object.position[:2] - tip_position[:2]))
-            offset = abs(distance - object_class.contact_radius)
             gap = abs(float(fake_object.position[2]) + object_class.height / 2 - tip_position[2])
-            is_touched = offset <= MAX_GRIP_OFFSET and gap <= TOUCH_DISTANCE
-            if is_touched and fake_object is not self.held_object:
+            if gap > TOUCH_DISTANCE or fake_object is self.held_object:
+                continue
+            distance = float(np.linalg.norm(fake_object.position[:2] - tip_position[:2]))
+            if abs(distance - object_class.contact_radius) <= MAX_GRIP_OFFSET:
                 return fake_object
         return None
 
