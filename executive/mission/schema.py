@@ -7,6 +7,7 @@ import inspect
 import json
 import re
 from collections.abc import Mapping, Sequence
+from functools import cache
 from itertools import chain, pairwise
 from typing import TypeAlias, cast, get_origin
 
@@ -66,10 +67,12 @@ class Draft07(GenerateJsonSchema):
         return False
 
 
-def find_attribute_docstrings(declaring_class: type[object]) -> dict[str, str]:
+@cache
+def find_attribute_docstrings(declaring_class: type[object]) -> Mapping[str, str]:
     """Return the docstring of each annotated attribute of a class and its bases in the same module, by name.
 
-    The option `use_attribute_docstrings` of pydantic would parse the source code in every process.
+    The option `use_attribute_docstrings` of pydantic would parse the source code in every process. Cached,
+    because several sections contain the same class, and the module is parsed for each class.
     """
     owners = [owner for owner in declaring_class.__mro__ if owner.__module__ == declaring_class.__module__]
     definitions = [ast.parse(inspect.getsource(owner)).body[0] for owner in owners]
