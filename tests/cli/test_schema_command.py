@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 
 import pytest
 from at_terminal import invoke
@@ -18,15 +19,15 @@ from executive.tree.node import load_control_nodes
 
 
 @pytest.mark.parametrize(
-    ("options", "expected"),
+    ("options", "make"),
     [
-        ([], make_mission_schema(load_skills(), load_control_nodes())),
-        (["--library"], make_library_schema(load_skills(), load_control_nodes())),
-        (["--cell"], make_cell_schema()),
-        (["--arm"], make_arm_schema()),
+        ([], lambda: make_mission_schema(load_skills(), load_control_nodes())),
+        (["--library"], lambda: make_library_schema(load_skills(), load_control_nodes())),
+        (["--cell"], make_cell_schema),
+        (["--arm"], make_arm_schema),
     ],
 )
-def test_the_schema_asked_for_is_printed(options: list[str], expected: object) -> None:
+def test_the_schema_asked_for_is_printed(options: list[str], make: Callable[[], object]) -> None:
     result = invoke("schema", *options)
     assert result.exit_code == 0
-    assert json.loads(result.stdout) == expected
+    assert json.loads(result.stdout) == make()

@@ -86,7 +86,7 @@ def shared_cells() -> Iterator[None]:
         yield
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def skills() -> dict[str, type[Skill]]:
     return dict(SKILLS)
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import pytest
@@ -24,13 +26,26 @@ from executive.text.yaml_files import parse_yaml
 from executive.tree.node import load_control_nodes
 
 MISSIONS = get_shipped_folder()
-SCHEMAS: dict[str, tuple[dict[str, Any], str]] = {
-    "mission.schema.json": (make_mission_schema(load_skills(), load_control_nodes()), ""),
-    "cells/cell.schema.json": (make_cell_schema(), " --cell"),
-    "arms/arm.schema.json": (make_arm_schema(), " --arm"),
+
+Maker = Callable[[], dict[str, Any]]
+
+
+@cache
+def make_shipped_mission_schema() -> dict[str, Any]:
+    return make_mission_schema(load_skills(), load_control_nodes())
+
+
+@cache
+def make_shipped_library_schema() -> dict[str, Any]:
+    return make_library_schema(load_skills(), load_control_nodes())
+
+
+SCHEMAS: dict[str, tuple[Maker, str]] = {
+    "mission.schema.json": (make_shipped_mission_schema, ""),
+    "cells/cell.schema.json": (cache(make_cell_schema), " --cell"),
+    "arms/arm.schema.json": (cache(make_arm_schema), " --arm"),
 }
-"""The generated files: the content of each, and the option that prints it."""
-LIBRARY_SCHEMA = make_library_schema(load_skills(), load_control_nodes())
+"""The generated files: what makes the content of each, and the option that prints it."""
 FILES = {
     "mission.schema.json": "*.yaml",
     "library/library.schema.json": "library/*.yaml",
@@ -58,15 +73,16 @@ def problems(schema: dict[str, Any], text: str) -> list[str]:
 
 @pytest.mark.parametrize("name", SCHEMAS)
 def test_the_shipped_schema_is_the_generated_one(name: str) -> None:
-    schema, option = SCHEMAS[name]
+    make, option = SCHEMAS[name]
     written = json.loads((MISSIONS / name).read_text(encoding="utf-8"))
-    assert written == schema, f"run `executive schema{option} > missions/{name}`"
+    assert written == make(), f"run `executive schema{option} > missions/{name}`"
 
 
 @pytest.mark.parametrize(
-    "schema", [*(schema for schema, _ in SCHEMAS.values()), LIBRARY_SCHEMA], ids=[*SCHEMAS, "library"]
+    "make", [*(make for make, _ in SCHEMAS.values()), make_shipped_library_schema], ids=[*SCHEMAS, "library"]
 )
-def test_the_schema_is_sound_draft_07(schema: dict[str, Any]) -> None:
+def test_the_schema_is_sound_draft_07(make: Maker) -> None:
+    schema = make()
     Draft7Validator.check_schema(schema)
     referred = set(re.findall(r'"\$ref": "#/definitions/(\w+)"', json.dumps(schema)))
     assert referred <= set(schema["definitions"])
@@ -130,8 +146,14 @@ trees:
 """
 
 
-def test_everything_of_the_language_is_accepted(skills: dict[str, type[Skill]]) -> None:
-    assert problems(make_mission_schema(skills, load_control_nodes()), WELL_FORMED) == []
+@pytest.fixture(scope="module")
+def mission_schema(skills: dict[str, type[Skill]]) -> dict[str, Any]:
+    """The schema of missions with the throw-away skills."""
+    return make_mission_schema(skills, load_control_nodes())
+
+
+def test_everything_of_the_language_is_accepted(mission_schema: dict[str, Any]) -> None:
+    assert problems(mission_schema, WELL_FORMED) == []
     written = set(re.findall(r"[a-z_]+(?=:)", WELL_FORMED))
     assert set(load_control_nodes()) <= written, "the example must show every control node"
 
@@ -159,25 +181,25 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("case", BROKEN)
-def test_what_is_wrong_is_marked(case: str, skills: dict[str, type[Skill]]) -> None:
+def test_what_is_wrong_is_marked(case: str, mission_schema: dict[str, Any]) -> None:
     text, expected = BROKEN[case]
-    found = problems(make_mission_schema(skills, load_control_nodes()), HEAD + text)
-    assert expected in "\n".join(found)
+    assert expected in "\n".join(problems(mission_schema, HEAD + text))
 
 
 @pytest.mark.parametrize(
-    "schema",
-    [{"$ref": f"{FOLDER}/library/library.schema.json"}, LIBRARY_SCHEMA],
+    "make",
+    [lambda: {"$ref": f"{FOLDER}/library/library.schema.json"}, make_shipped_library_schema],
     ids=["shipped", "printed"],
 )
-def test_a_library_has_subtrees_and_no_tree(schema: dict[str, Any]) -> None:
+def test_a_library_has_subtrees_and_no_tree(make: Maker) -> None:
+    schema = make()
     assert problems(schema, "library: sorting\ntrees: {look: Detect}") == []
     assert "'tree' was unexpected" in problems(schema, "library: a\ntrees: {}\ntree: Detect")[0]
     assert "trees.look" in problems(schema, "library: a\ntrees: {look: {do: {Detect: {vieww: a}}}}")[0]
 
 
 def test_a_cell_with_a_base_needs_no_other_key(small_cell: str) -> None:
-    schema = make_cell_schema()
+    schema = SCHEMAS["cells/cell.schema.json"][0]()
     assert problems(schema, small_cell) == []
     assert problems(schema, "base: small.yaml") == []
     assert ": 'arm' is a required property" in problems(schema, "cell: a")
