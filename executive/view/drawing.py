@@ -16,6 +16,7 @@ import re
 import textwrap
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from types import MappingProxyType
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -100,11 +101,16 @@ def render_template(template: str, **values: object) -> str:
 
     `template` is the path of the template file, relative to `executive/view`.
     """
-    environment = Environment(
+    return replace_invalid_xml_characters(_make_environment().get_template(template).render(values))
+
+
+@cache
+def _make_environment() -> Environment:
+    """Return the environment of all templates; cached, because it keeps the compiled templates."""
+    return Environment(
         loader=PackageLoader("executive.view", "templates"), autoescape=True, undefined=StrictUndefined,
         trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
-    return replace_invalid_xml_characters(environment.get_template(template).render(values))
 
 
 def draw_text(nodes: Sequence[OutlineNode], *, shows_ports: bool = False, shows_reasons: bool = False) -> str:
