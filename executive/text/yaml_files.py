@@ -141,7 +141,7 @@ def parse_yaml(source: Source, text: str | None = None) -> tuple[YamlNode | None
     `text` is the YAML text at the same positions as in the source; by default the text of the source.
     """
     text = source.text if text is None else text
-    composer = _Composer(source, text, yaml.SafeLoader if _LIBYAML_DIFFERENCE.search(text) else _FAST_LOADER)
+    composer = _Composer(source, text, _choose_loader(text))
     try:
         try:
             root = composer.read_document()
@@ -161,8 +161,10 @@ def parse_yaml(source: Source, text: str | None = None) -> tuple[YamlNode | None
     return root, composer.findings
 
 
-def load_yaml(source: Source, loader: type[yaml.SafeLoader | yaml.BaseLoader] = yaml.SafeLoader) -> Any:
+def load_yaml(source: Source, loader: type[yaml.BaseLoader] | None = None) -> Any:
     """Return YAML text within the bounds of missions as plain values, as a loader of PyYAML converts them.
+
+    `loader` is None for the values of `SafeLoader`.
 
     Raises:
         InputError: The text is not valid YAML, or exceeds a bound.
@@ -172,7 +174,12 @@ def load_yaml(source: Source, loader: type[yaml.SafeLoader | yaml.BaseLoader] = 
     for finding in findings:
         if finding.code != "tag":
             raise InputError(f"{source.path}:{finding.line}: {finding.message}")
-    return yaml.load(source.text, loader)
+    return yaml.load(source.text, loader or _choose_loader(source.text))
+
+
+def _choose_loader(text: str) -> type[yaml.SafeLoader]:
+    """Return the fastest loader that reads a text like the Python parser."""
+    return yaml.SafeLoader if _LIBYAML_DIFFERENCE.search(text) else _FAST_LOADER
 
 
 class _IncompleteTree(Exception):
