@@ -13,7 +13,7 @@ from click.testing import Result
 from executive.campaign.fault_list import PlannedFault, SkillFault
 from executive.campaign.faults import Campaign, Trial
 
-FAKE = ("sort_overhead", "--set", "cell.kind=fake")
+FAKE = ("sort_overhead", "--set", "cell.kind=fake", "--set", "cell.table.objects=[1, 1]")
 FAULT = PlannedFault(
     "tree/Grasp", "Grasp sort.yaml:7", "missed", "first", SkillFault("Grasp", "missed", (1,))
 )
