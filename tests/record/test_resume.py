@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import signal
 from dataclasses import replace
 from pathlib import Path
@@ -32,6 +33,21 @@ from tests.benchmarks.kills import find_handled_twice
 from tests.cut_off import Cut, Cutter
 
 SEED = 3
+
+
+@pytest.fixture(scope="module")
+def whole_runs(missions: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with one complete run of `sort_overhead`."""
+    runs = tmp_path_factory.mktemp("whole")
+    run_of(load(missions, "sort_overhead"), runs, frames=True)
+    return runs
+
+
+@pytest.fixture
+def whole_run(whole_runs: Path, tmp_path: Path) -> Path:
+    """The directory of the complete run, copied to `tmp_path`."""
+    shutil.copytree(whole_runs, tmp_path, dirs_exist_ok=True)
+    return next(tmp_path.glob("*/*/journal.jsonl")).parent
 
 
 class Emptier(Cutter):
@@ -156,25 +172,23 @@ def test_a_run_that_a_bug_ended_resumes_after_the_repair(missions: Path, tmp_pat
     assert handled_twice(run) == []
 
 
-def test_there_must_be_something_to_take_up(missions: Path, tmp_path: Path) -> None:
-    path = Path(run_of(load(missions, "sort_overhead"), tmp_path).run)
+def test_there_must_be_something_to_take_up(whole_run: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"ended as SUCCESS; there is nothing to resume"):
-        resumed(path)
-    (path / "journal.jsonl").write_text("")
+        resumed(whole_run)
+    (whole_run / "journal.jsonl").write_text("")
     with pytest.raises(InputError, match="was interrupted before its start"):
-        resumed(path)
+        resumed(whole_run)
     with pytest.raises(InputError, match=r'"nowhere" is no run directory, .* the last runs there: 20'):
         find_run("nowhere", tmp_path)
     with pytest.raises(InputError, match="it contains no run at all"):
         find_run("latest", tmp_path / "empty")
 
 
-def test_a_run_whose_journal_lost_commands_to_the_tool_is_refused(missions: Path, tmp_path: Path) -> None:
-    path = Path(run_of(load(missions, "sort_overhead"), tmp_path, frames=True).run)
-    content = (path / "journal.jsonl").read_bytes()
-    (path / "journal.jsonl").write_bytes(content[: int(0.6 * len(content))])
+def test_a_run_whose_journal_lost_commands_to_the_tool_is_refused(whole_run: Path) -> None:
+    content = (whole_run / "journal.jsonl").read_bytes()
+    (whole_run / "journal.jsonl").write_bytes(content[: int(0.6 * len(content))])
     with pytest.raises(InputError, match="lacks later commands"):
-        resumed(path)
+        resumed(whole_run)
 
 
 @pytest.mark.slow
