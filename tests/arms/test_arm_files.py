@@ -31,6 +31,7 @@ arm:
 MISSION = "sort_bench.yaml"
 ARM = (get_shipped_folder() / "arms" / "iiwa14.yaml").read_text().replace("arm: iiwa14", "arm: cobot", 1)
 LIMITS = ARM[ARM.index("limits:") : ARM.index("# From the data sheet")]
+ONE_FAKE_OBJECT = ("--set", "cell.kind=fake", "--set", "cell.table.objects=[1, 1]")
 POSITIONS = "position_deg: [170, 120, 170, 120, 170, 120, 175]"
 
 
@@ -54,7 +55,7 @@ def change(file: str, old: str, new: str) -> None:
 def test_an_arm_file_beside_the_cell_is_checked_and_run() -> None:
     loaded = load_mission(MISSION, load_skills(), find_checker=load_checker)
     assert (loaded.warnings, loaded.cell_config.arm.arm) == ((), "cobot")
-    result = run_mission(MISSION, FakeCell, seed=5)
+    result = run_mission(MISSION, FakeCell, seed=5, set={"cell.table.objects": "[2, 2]"})
     assert (result.status, result.agrees, result.items["placed"]) == ("SUCCESS", True, result.items["seen"])
 
 
@@ -68,7 +69,7 @@ def test_the_same_arm_under_another_name_moves_in_the_same_way() -> None:
 
 def test_a_replay_needs_no_arm_file() -> None:
     for *words, status in (
-        ("run", MISSION, "--set", "cell.kind=fake", "--quiet", "--runs", "runs", 0),
+        ("run", MISSION, *ONE_FAKE_OBJECT, "--quiet", "--runs", "runs", 0),
         ("check", MISSION, 0),
         ("replay", "latest", "--runs", "runs", 0),
         ("check", MISSION, 2),

@@ -20,7 +20,8 @@ from tests.benchmarks.longest_step import WallClockDriver
 
 
 def make(missions: Path, observer) -> Run:
-    loaded = load_mission(missions / "sort_overhead.yaml", load_skills())
+    one_object = {"cell.table.objects": "[1, 1]"}
+    loaded = load_mission(missions / "sort_overhead.yaml", load_skills(), one_object)
     return assemble(loaded, RunOptions(3, make_cell=FakeCell), [observer])
 
 
