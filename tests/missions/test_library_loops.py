@@ -7,7 +7,7 @@ import pytest
 from tests.benchmarks.library_loops import explain_problem
 
 
-@pytest.mark.parametrize("seed", [12, 15])
+@pytest.mark.parametrize("seed", [pytest.param(12, marks=pytest.mark.slow), 15])
 def test_each_loop_ends_after_a_limited_number_of_picks_of_each_object(seed: int) -> None:
     assert explain_problem(seed, "fake") == ""
 
