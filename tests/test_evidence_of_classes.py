@@ -6,6 +6,7 @@ import itertools
 import math
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
@@ -14,6 +15,7 @@ from executive.cell.objects import ObjectClass
 from executive.geometry import rotate_about_z
 from executive.perception.camera_model import project
 from executive.perception.evidence import (
+    describe_outline_contradiction,
     describe_size_contradiction,
     describe_top_contradiction,
     describe_unknown_labels,
@@ -57,6 +59,41 @@ def test_both_sides_of_a_box_have_to_fit_the_footprint_at_one_yaw(yaw_deg, lengt
     box = Detection("cube", 0.9, (*pixels.min(axis=0), *pixels.max(axis=0)))
     cube = replace(CUBE, footprint=(0.05, 0.05))
     assert (describe_size_contradiction(box, place, FRAME, cube) == "") is fits
+
+
+def test_the_box_of_a_cube_on_another_one_may_contain_both():
+    place = np.array([0.64, -0.22, 0.075])
+    corners = np.array([*itertools.product((-0.025, 0.025), (-0.025, 0.025), (-0.075, 0.025))])
+    pixels = project(FRAME.matrix, FRAME.X_WC, place + corners @ rotate_about_z(math.radians(45)).T)
+    box = Detection("cube", 0.9, (*pixels.min(axis=0), *pixels.max(axis=0)))
+    cube = replace(CUBE, footprint=(0.05, 0.05))
+    assert describe_size_contradiction(box, place, FRAME, cube) == ""
+    assert describe_size_contradiction(box, place - (0, 0, 0.05), FRAME, cube)
+
+
+@pytest.mark.parametrize(
+    ("sides", "shown_fraction", "contrast", "fits"),
+    [
+        ((0.05, 0.05), 1.0, 100, True),
+        ((0.07, 0.035), 1.0, 100, False),
+        ((0.09, 0.05), 0.7, 100, False),
+        ((0.07, 0.035), 1.0, 5, True),
+    ],
+    ids=["cube", "brick with the box of a cube", "box of a part of a brick", "without contrast"],
+)
+def test_the_pixels_of_an_object_have_to_fill_the_outline_of_its_class(sides, shown_fraction, contrast, fits):
+    place = np.array([0.5, 0.0, 0.025])
+    corners = np.array([*itertools.product((-0.5, 0.5), repeat=3)]) * (*sides, 0.05)
+    pixels = project(FRAME.matrix, FRAME.X_WC, place + corners @ rotate_about_z(math.radians(45)).T)
+    image = np.full((480, 640, 3), 120, np.uint8)
+    cv2.fillConvexPoly(image, cv2.convexHull(pixels.round().astype(np.int32)), (120 + contrast, 120, 120))
+    low = pixels.min(axis=0)
+    box = Detection("cube", 0.9, (*low, *low + shown_fraction * np.ptp(pixels, axis=0)))
+    rates = ErrorRates(0.5, 0.01, 0.01, 0.01, 1.0)
+    frame = replace(FRAME, image=image)
+    look = Detections("eye", (box,), rates, frame=frame, view="table", area=AREA)
+    cube = replace(CUBE, footprint=(0.05, 0.05))
+    assert (describe_outline_contradiction(look, box, place, cube) == "") is fits
 
 
 def observe_sphere(box: Box, frame: Frame) -> str:

@@ -139,6 +139,36 @@ def test_a_bin_keeps_the_objects_that_the_robot_brought(boxes: Bench) -> None:
     assert event.text == "something left red_bin, and the robot did not do it"
 
 
+@pytest.mark.parametrize(
+    ("area", "text"),
+    [
+        (0.0084, ""),
+        (0.0030, "something left red_bin, and the robot did not do it"),
+        (0.0140, "something came into red_bin, and the robot did not do it"),
+    ],
+    ids=["both", "one of two", "three"],
+)
+def test_the_first_images_of_a_bin_after_placements_show_what_the_robot_brought(
+    boxes: Bench, area: float, text: str
+) -> None:
+    boxes.look(CUBE, ("cube", 0.6, 0.1), view="full")
+    boxes.place("cube-1")
+    boxes.place("cube-2")
+    for _ in range(2):
+        boxes.ledger.observe_bins({"red_bin": BinAppearance(None, area, is_whole=True)}, take_frame())
+    assert [event.text for event in boxes.ledger.unexplained.events] == [text] * bool(text)
+
+
+def test_what_the_robot_brings_does_not_hide_what_an_image_showed_before(boxes: Bench) -> None:
+    boxes.look(CUBE, view="full")
+    boxes.ledger.observe_bins({"red_bin": BinAppearance(None, 0.0022, is_whole=True)}, take_frame())
+    boxes.place("cube-1")
+    boxes.ledger.observe_bins({"red_bin": BinAppearance(None, 0.0058, is_whole=True)}, take_frame())
+    boxes.end()
+    (event,) = boxes.ledger.unexplained.events
+    assert event.text == "something came into red_bin, and the robot did not do it"
+
+
 @pytest.mark.parametrize("between", [[], [()]], ids=["seen at once", "appeared later"])
 def test_an_item_that_looks_show_where_it_was_picked_is_not_in_the_bin(bench: Bench, between: list) -> None:
     bench.look(CUBE, view="full")
