@@ -74,7 +74,7 @@ GREY = np.full(3, 1 / 3)
 
 def inspect_bins(frame: Frame, bins: Sequence[Bin]) -> dict[str, BinAppearance]:
     """Return what a frame shows of the bins, by name; a bin of which too little is in view is missing."""
-    if not bins:
+    if not bins or np.percentile(frame.image[::8, ::8].max(axis=2), 90) < MIN_BRIGHTNESS:
         return {}
     depth = min(frame.compute_depth(bin.position) for bin in bins)
     side = 2 * round(ARM_MARGIN * float(frame.matrix[0, 0]) / max(depth, ARM_MARGIN)) + 1
@@ -93,8 +93,6 @@ def _find_contradictions(frame: Frame, bins: Sequence[Bin]) -> dict[str, str]:
     """Return "" for each bin that a frame shows as declared, and a sentence for each that it contradicts."""
     verdicts: dict[str, str] = {}
     suspects: dict[str, str] = {}
-    if np.percentile(frame.image[::8, ::8].max(axis=2), 90) < MIN_BRIGHTNESS:
-        return verdicts
     masks = [compute_bin_mask(frame, bin) for bin in bins]
     fitter = OutlineFitter(frame, bins)
     supports = fitter.compute_bin_supports(masks)
