@@ -74,8 +74,9 @@ class ObjectConfig(Section):
     object, but another object."""
     footprint: tuple[Length, Length] | None = None
     """Length and width of the rectangle around the outline of the object, seen from above [m]. If given, both
-    sides of a detected box must fit it at some yaw, otherwise only the longer side must fit the radius. With a
-    flat top, the object is a prism over this rectangle, and its outline in the image must be that of the prism."""
+    sides of a detected box must fit it at some yaw, otherwise only the longer side must fit the radius. If
+    the top is flat, the outline in the image must be that of a prism over the part of the rectangle within
+    the radius."""
     ring: Distance = 0.0
     """Distance of the contact point from the centre [m]; above 0 only for parts with a hole."""
     colours: tuple[Colour, ...] = ((1.0, 1.0, 1.0),)

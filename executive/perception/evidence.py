@@ -184,14 +184,12 @@ def _describe_footprint_contradiction(
     of an object that stands on another one may contain the other one, if both have the same colour.
     """
     footprint = np.array(object_class.footprint)
-    angles = np.linspace(0, math.pi, 16, endpoint=False)
-    circle = object_class.radius * np.array([np.cos(angles), np.sin(angles)])
-    outline = np.clip(circle, -footprint[:, None] / 2, footprint[:, None] / 2)
+    outline = _make_outline(object_class)
     half_height = object_class.height / 2
     cosines = np.cos(FOOTPRINT_YAWS)[:, None]
     sines = np.sin(FOOTPRINT_YAWS)[:, None]
-    rotated_x = cosines * outline[0] - sines * outline[1]
-    rotated_y = sines * outline[0] + cosines * outline[1]
+    rotated_x = cosines * outline[:, 0] - sines * outline[:, 1]
+    rotated_y = sines * outline[:, 0] + cosines * outline[:, 1]
     # Centres of bottom, middle and top of the prism, and of what is below, and their derivatives by x and y
     # [pixel/m].
     heights = [-half_height, 0.0, half_height]
@@ -223,10 +221,19 @@ def _describe_footprint_contradiction(
     )
 
 
+def _make_outline(object_class: ObjectClass) -> Array:
+    """Return points `(32, 3)` [m] on the edge of the part of the footprint within the radius of a class."""
+    angles = np.linspace(0, 2 * math.pi, 32, endpoint=False)
+    circle = object_class.radius * np.stack([np.cos(angles), np.sin(angles), np.zeros(32)], axis=1)
+    half_size = np.array(object_class.footprint) / 2
+    circle[:, :2] = np.clip(circle[:, :2], -half_size, half_size)
+    return circle
+
+
 def describe_outline_contradiction(
     look: Detections, detection: Detection, position: Array, object_class: ObjectClass
 ) -> str:
-    """Return a sentence if an object does not look like a prism over the footprint of its class, else "".
+    """Return a sentence if an object does not look like a prism over the outline of its class, else "".
 
     The outline of the object is that of the connected pixels that differ from the table, outside of the boxes
     of other detections. The result is also "" for an object on another one, and if the contrast is too small.
@@ -241,13 +248,12 @@ def describe_outline_contradiction(
         return ""
     frame = look.frame
     outline, is_free, corner = _find_outline(look, detection)
-    length, width = np.array(object_class.footprint) / 2
-    rectangle = np.array([(length, width, 0), (-length, width, 0), (-length, -width, 0), (length, -width, 0)])
+    shape = _make_outline(object_class)
     half_height = np.array([0.0, 0.0, object_class.height / 2])
     outline_area = cv2.countNonZero(outline)
     best_overlap = 0.0
     for yaw in OUTLINE_YAWS:
-        rotated = rectangle @ rotate_about_z(yaw).T
+        rotated = shape @ rotate_about_z(yaw).T
         prism = position + np.concatenate([rotated - half_height, rotated + half_height])
         pixels = (project(frame.matrix, frame.X_WC, prism) - corner).round().astype(np.int32)
         expected = np.zeros_like(outline)
