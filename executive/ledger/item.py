@@ -25,6 +25,8 @@ REASON_NOT_FOUND = "more looks missed it than saw it"
 REASON_UNCERTAIN = "it has no confident detection"
 """Reason for the rejection of an item with doubtful detections only."""
 
+MAX_REJECTIONS = 3
+"""Number of rejections of an item after which a look at another place no longer opens it again."""
 MIN_REMOVAL_PROBABILITY = 0.05
 """Minimum probability of a removal (`Belief.removal_probability`) with which the result names a phantom. In
 62 runs of five shipped missions without a removal, no item was a phantom."""
@@ -100,6 +102,7 @@ class ItemRecord:
         slot: Index of the slot of the bin over which the item was released, or None.
         has_appeared: True if a look, since the robot last may have moved objects to the position of the first
             detection, searched this position before the first detection.
+        rejection_count: Number of times that the mission rejected the item.
         common_frame_counts: For each near item, number of times that a frame showed both items separately.
     """
 
@@ -137,6 +140,7 @@ class ItemRecord:
     was_detected_in_bin: bool = False
     slot: int | None = None
     has_appeared: bool = False
+    rejection_count: int = 0
     common_frame_counts: Counter[Item] = field(default_factory=Counter)
 
     def __post_init__(self) -> None:
@@ -282,7 +286,8 @@ class ItemRecord:
         self.yaw = new_item.yaw
         if self.state is State.PHANTOM:
             self.belief.log_odds = new_item.belief.log_odds
-            self.reason = ""
+            is_hopeless = self.rejection_count >= MAX_REJECTIONS
+            self.reason = f"it was rejected {self.rejection_count} times" if is_hopeless else ""
         if self.state in (State.DROPPED, State.PHANTOM):
             self.state = State.REJECTED if self.reason else State.SEEN
 

@@ -239,6 +239,7 @@ class Tracker:
 
     def reject(self, item: Item, reason: str) -> None:
         record = self._records.find(item)
+        record.rejection_count += 1
         record.reason = f"{reason}: {record.last_contradiction}" if record.last_contradiction else reason
         # A held or dropped item keeps its state until a look shows the item on the table.
         is_off_table = record.state in (State.HELD, State.DROPPED)

@@ -15,7 +15,7 @@ from executive.cell.objects import ObjectClass
 from executive.geometry import GRAVITY, Yaw, rotate_about_z
 from executive.ledger.belief import Belief
 from executive.ledger.bin_contents import update_bin_log_odds
-from executive.ledger.item import ItemRecord
+from executive.ledger.item import ItemRecord, State
 from executive.ledger.look import compute_association_distance
 from executive.perception.evidence import compute_weight_log_ratios
 
@@ -30,6 +30,17 @@ def belief(log_odds: float = 0.0) -> Belief:
 
 def record() -> ItemRecord:
     return ItemRecord("cube-1", belief(), HERE, 0, 0.0, False)
+
+
+@pytest.mark.parametrize(("rejections", "state"), [(2, State.SEEN), (3, State.REJECTED)])
+def test_an_item_that_was_rejected_often_is_not_opened_again_at_another_place(
+    rejections: int, state: State
+) -> None:
+    item = record()
+    item.rejection_count = rejections
+    item.set_state(State.PHANTOM, "more looks missed it than saw it")
+    item.merge(record(), 0.1)
+    assert (item.state, bool(item.reason)) == (state, state is State.REJECTED)
 
 
 def test_one_vote_of_a_good_detector_is_enough_for_a_class_and_three_of_a_bad_one() -> None:
