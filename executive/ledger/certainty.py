@@ -14,6 +14,10 @@ REASON_CONTRADICTED = "images contradict the declared place or colour of"
 """Start of the reason of the state REJECTED of an item without a bin that may be used."""
 MIN_EXISTENCE_PROBABILITY = 0.9
 """Minimum probability of existence of an item that is picked, or matched to a moved item."""
+MIN_EXISTENCE_FOR_TOUCH = 0.5
+"""Minimum probability of existence of an item that the tool may touch to prove the existence."""
+MIN_REPEATS_FOR_TOUCH = 10
+"""Number of repeated classes after which more looks from a viewpoint hardly prove the existence."""
 MIN_P_VALUE = 0.01
 """Minimum p-value of the class-consistency test (`Belief.confusion_p_value`) of an item that is sorted."""
 MAX_P_VALUE_TO_REJECT = 0.001
@@ -52,12 +56,15 @@ class Certainty:
     def is_certain(self, record: ItemRecord) -> bool:
         """Return True if an item's existence, class and position are certain enough to touch the item.
 
-        After a failed grasp, the position must be known more precisely.
+        After a failed grasp, the position must be known more precisely. A smaller probability of existence
+        suffices if further looks from the same viewpoint cannot prove the existence, but a touch can.
         """
         belief = record.belief
+        is_saturated = belief.repeat_count >= MIN_REPEATS_FOR_TOUCH
+        min_existence = MIN_EXISTENCE_FOR_TOUCH if is_saturated else MIN_EXISTENCE_PROBABILITY
         error_factor = RETRY_STANDARD_ERROR_FACTOR if record.failed_pick_count else 1.0
         return (
-            belief.existence_probability >= MIN_EXISTENCE_PROBABILITY
+            belief.existence_probability >= min_existence
             and record.contradiction_count < belief.look_count
             and belief.miss_probability >= MIN_MISS_PROBABILITY_OF_PICK
             and self.is_class_certain(record)

@@ -173,3 +173,12 @@ def test_the_systematic_error_of_a_position_does_not_shrink_with_the_number_of_l
         bench.look(THERE, by=replace(EYE, bias=0.006))
     record = record_of(bench)
     assert (record.standard_error < 0.002, certainty.is_certain(record)) == (True, False)
+
+
+@pytest.mark.parametrize(("looks", "is_certain"), [(5, False), (12, True)])
+def test_an_item_where_none_is_expected_is_touched_after_many_looks_from_one_viewpoint(
+    bench: Bench, looks: int, is_certain: bool
+) -> None:
+    for _ in range(looks):
+        bench.look(("cube", 0.7, 0.33), view="full", by=replace(EYE, repeated=0.9))
+    assert bench.ledger.is_certain("cube-1") is is_certain
