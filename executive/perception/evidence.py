@@ -7,7 +7,8 @@ An object may stand on the table or, in a cell with stacks, on one object of any
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -38,12 +39,10 @@ SIZE_TOLERANCE = 0.15
 """Maximum relative difference between the size of a box and the sizes that its class allows."""
 SIZE_TOLERANCE_PX = 2.0
 """Maximum additional difference between the size of a box and the sizes that its class allows [pixel]."""
-DERIVATIVE_STEP = 0.01
-"""Distance from the centre of an object at which the derivatives of its image are computed [m]."""
-FOOTPRINT_YAWS = np.radians(np.arange(0.0, 180.0, 5.0))
-"""Yaws at which the footprint of a class is compared with a box `(36,)` [rad]."""
-OUTLINE_YAWS = np.concatenate([FOOTPRINT_YAWS[0::3], FOOTPRINT_YAWS[1::3], FOOTPRINT_YAWS[2::3]])
-"""The same yaws, in an order in which one that fits well enough comes early `(36,)` [rad]."""
+FOOTPRINT_YAWS = np.radians([start + step for start in (0, 5, 10) for step in range(0, 180, 15)])
+"""Yaws at which the outline of a class is compared with an object `(36,)` [rad]; one that fits is early."""
+FOOTPRINT_ROTATIONS = np.array([rotate_about_z(-yaw) for yaw in FOOTPRINT_YAWS])
+"""Matrices `(36, 3, 3)` that turn row vectors by these yaws."""
 MIN_SIDE_FRACTION = 0.85
 """Minimum side of a box, as a fraction of the same side of the image of the footprint of its class."""
 MAX_SIDE_FACTOR = 1.07
@@ -183,51 +182,40 @@ def _describe_footprint_contradiction(
     that of the image of the outline at half the height, and at most that of a prism over the outline. The box
     of an object that stands on another one may contain the other one, if both have the same colour.
     """
-    footprint = np.array(object_class.footprint)
-    outline = _make_outline(object_class)
     half_height = object_class.height / 2
-    cosines = np.cos(FOOTPRINT_YAWS)[:, None]
-    sines = np.sin(FOOTPRINT_YAWS)[:, None]
-    rotated_x = cosines * outline[:, 0] - sines * outline[:, 1]
-    rotated_y = sines * outline[:, 0] + cosines * outline[:, 1]
-    # Centres of bottom, middle and top of the prism, and of what is below, and their derivatives by x and y
-    # [pixel/m].
-    heights = [-half_height, 0.0, half_height]
-    is_on_other_object = position[2] - half_height > TOP_TOLERANCE
-    if is_on_other_object:
-        heights.append(-position[2])
-    levels = np.array([(0.0, 0.0, height) for height in heights])
-    shifts = DERIVATIVE_STEP * np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0)])[:, None]
-    pixels = project(frame.matrix, frame.X_WC, position + levels + shifts)
-    centres = pixels[0]
-    x_slope = (pixels[1] - centres)[..., None, None] / DERIVATIVE_STEP
-    y_slope = (pixels[2] - centres)[..., None, None] / DERIVATIVE_STEP
-    # The outline is symmetric to its centre. The arrays have the axes level, side of the box, and yaw.
-    half_sides = np.abs(x_slope * rotated_x + y_slope * rotated_y).max(axis=-1)
-    if is_on_other_object:
-        half_sides[3] = object_class.radius * np.hypot(x_slope, y_slope)[3, ..., 0]
-    outline_sides = 2 * half_sides[1]
-    highest = (centres[..., None] + half_sides).max(axis=0)
-    lowest = (centres[..., None] - half_sides).min(axis=0)
-    prism_sides = highest - lowest
+    pixels = _project_outlines(frame, position, object_class, [-half_height, 0.0, half_height])
+    outline_sides = np.ptp(pixels[:, 1], axis=1)
+    corners = pixels.reshape(len(pixels), -1, 2)
+    if position[2] - half_height > TOP_TOLERANCE:
+        base = _project_outlines(frame, position, replace(object_class, footprint=None), [-position[2]])
+        corners = np.concatenate([corners, base[:, 0]], axis=1)
+    prism_sides = np.ptp(corners, axis=1)
     sides = np.subtract(detection.box[2:], detection.box[:2])
-    is_long_enough = sides[:, None] + SIDE_TOLERANCE_PX >= MIN_SIDE_FRACTION * outline_sides
-    is_short_enough = sides[:, None] - SIDE_TOLERANCE_PX <= MAX_SIDE_FACTOR * prism_sides
-    if np.any(np.all(is_long_enough & is_short_enough, axis=0)):
+    is_long_enough = sides + SIDE_TOLERANCE_PX >= MIN_SIDE_FRACTION * outline_sides
+    is_short_enough = sides - SIDE_TOLERANCE_PX <= MAX_SIDE_FACTOR * prism_sides
+    if np.any(np.all(is_long_enough & is_short_enough, axis=1)):
         return ""
     size = _format_size(sides * frame.compute_depth(position) / float(frame.matrix[0, 0]))
-    return (
-        f"its box is {size}, and a {detection.label}, {_format_size(footprint)} from above, fits it at no yaw"
-    )
+    expectation = f"a {detection.label}, {_format_size(np.array(object_class.footprint))} from above"
+    return f"its box is {size}, and {expectation}, fits it at no yaw"
 
 
-def _make_outline(object_class: ObjectClass) -> Array:
-    """Return points `(32, 3)` [m] on the edge of the part of the footprint within the radius of a class."""
-    angles = np.linspace(0, 2 * math.pi, 32, endpoint=False)
-    circle = object_class.radius * np.stack([np.cos(angles), np.sin(angles), np.zeros(32)], axis=1)
-    half_size = np.array(object_class.footprint) / 2
-    circle[:, :2] = np.clip(circle[:, :2], -half_size, half_size)
-    return circle
+def _project_outlines(
+    frame: Frame, position: Array, object_class: ObjectClass, heights: Sequence[float]
+) -> Array:
+    """Return the pixels `(36, N, 16, 2)` of the outline of a class at `FOOTPRINT_YAWS` and some heights.
+
+    The outline is the part of the footprint within the radius. The N `heights` [m] are relative to the centre
+    of the object, `position` `(3,)` [m].
+    """
+    angles = np.linspace(0, 2 * math.pi, 16, endpoint=False)
+    outline = object_class.radius * np.stack([np.cos(angles), np.sin(angles), np.zeros(16)], axis=1)
+    if object_class.footprint is not None:
+        half_size = np.array(object_class.footprint) / 2
+        outline[:, :2] = np.clip(outline[:, :2], -half_size, half_size)
+    levels = np.array([(0.0, 0.0, height) for height in heights])[:, None]
+    points = position + levels + (outline @ FOOTPRINT_ROTATIONS)[:, None]
+    return project(frame.matrix, frame.X_WC, points.reshape(-1, 3)).reshape(*points.shape[:3], 2)
 
 
 def describe_outline_contradiction(
@@ -248,14 +236,12 @@ def describe_outline_contradiction(
         return ""
     frame = look.frame
     outline, is_free, corner = _find_outline(look, detection)
-    shape = _make_outline(object_class)
-    half_height = np.array([0.0, 0.0, object_class.height / 2])
+    half_height = object_class.height / 2
+    prisms = _project_outlines(frame, position, object_class, [-half_height, half_height])
+    prism_pixels = (prisms.reshape(len(prisms), -1, 2) - corner).round().astype(np.int32)
     outline_area = cv2.countNonZero(outline)
     best_overlap = 0.0
-    for yaw in OUTLINE_YAWS:
-        rotated = shape @ rotate_about_z(yaw).T
-        prism = position + np.concatenate([rotated - half_height, rotated + half_height])
-        pixels = (project(frame.matrix, frame.X_WC, prism) - corner).round().astype(np.int32)
+    for pixels in prism_pixels:
         expected = np.zeros_like(outline)
         cv2.fillConvexPoly(expected, cv2.convexHull(pixels), 1)
         whole_area = cv2.countNonZero(expected)
