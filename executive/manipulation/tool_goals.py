@@ -154,9 +154,9 @@ def choose_bin(cell: Cell, item: Item) -> str:
     """Return the first free bin with a quota, else the free bin with the fewest objects, else "".
 
     A bin is free if it is permitted for the class of the item, its quota is not reached, and images do not
-    contradict it. An item that the
-    arm is moving into a bin counts as an object in the bin. If the class of the item is not certain by its
-    weight, and has no free bin, the function chooses a bin of a class that looks alike.
+    contradict it. An item that the arm is moving into a bin counts as an object in the bin. If the class of
+    the item is not certain by its weight, and has no free bin, the function chooses a bin of a class that
+    looks alike.
     """
     count_objects = partial(predict_object_count, cell)
     for label in cell.ledger.list_possible_labels(item):
