@@ -111,7 +111,7 @@ class ItemRecord:
     first_position: Array
     first_change_count: int
     first_stamp: float
-    was_place_empty: bool
+    was_place_empty: bool = False
     was_place_searched: bool = False
     position: Array = field(init=False)
     standard_error: float = math.inf
@@ -321,7 +321,7 @@ class ItemRecords:
         """
         if (last := self.archived.get(item)) is not None:
             return ItemRecord(
-                item, Belief(last.label, math.inf), np.array(last.position), 0, 0.0, False,
+                item, Belief(last.label, math.inf), np.array(last.position), 0, 0.0,
                 state=State(last.state), reason=last.reason, failed_pick_count=last.attempts,
             )  # fmt: skip
         if item not in self._records:
@@ -333,15 +333,7 @@ class ItemRecords:
         """Return the records of all items in one of the given states."""
         return [record for record in self.all if record.state in states]
 
-    def add(
-        self,
-        belief: Belief,
-        position: Array,
-        frame: Frame,
-        *,
-        was_place_empty: bool,
-        was_place_searched: bool,
-    ) -> ItemRecord:
+    def add(self, belief: Belief, position: Array, frame: Frame) -> ItemRecord:
         """Add an item with the name `<class>-<number>` and return its record.
 
         `position` `(3,)` [m] and `frame` are values of the first detection.
@@ -349,9 +341,7 @@ class ItemRecords:
         label = belief.first_label
         self._name_counts[label] += 1
         name = f"{label}-{self._name_counts[label]}"
-        record = ItemRecord(
-            name, belief, position, frame.change_count, frame.stamp, was_place_empty, was_place_searched
-        )
+        record = ItemRecord(name, belief, position, frame.change_count, frame.stamp)
         self._records[name] = record
         self.all = (*self.all, record)
         return record

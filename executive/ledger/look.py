@@ -356,11 +356,9 @@ class LookUpdate:
         belief = Belief(observation.detection.label, math.log(prior_odds))
         position = observation.position
         miss_probability = self.coverage.find_miss_probability(position)
-        record = self.records.add(
-            belief, position, self.look.frame,
-            was_place_empty=miss_probability <= self.config.max_miss_probability,
-            was_place_searched=self.coverage.was_searched(position),
-        )  # fmt: skip
+        record = self.records.add(belief, position, self.look.frame)
+        record.was_place_empty = miss_probability <= self.config.max_miss_probability
+        record.was_place_searched = self.coverage.was_searched(position)
         record.has_appeared = miss_probability < 1.0
         return record
 
