@@ -165,17 +165,12 @@ class Belief:
         hypotheses "exists", "left" and "never existed" have the posteriors o * (1 - r) * m, o * r and 1, up
         to a common factor; m is `miss_probability`.
         """
-        if self.is_confirmed:
-            return 1.0
-        log_odds_at_last_detection = self.log_odds - math.log(self.miss_probability)
-        return compute_probability(log_odds_at_last_detection + math.log(PRIOR_REMOVAL_PROBABILITY))
+        return compute_probability(self.log_odds_at_last_detection + math.log(PRIOR_REMOVAL_PROBABILITY))
 
     @property
-    def probability_at_last_detection(self) -> float:
-        """Probability that the item exists, 0 to 1, without the evidence since the last detection."""
-        if self.is_confirmed:
-            return 1.0
-        return compute_probability(self.log_odds - math.log(self.miss_probability))
+    def log_odds_at_last_detection(self) -> float:
+        """Log odds of existence without the evidence since the last detection; infinite if confirmed."""
+        return math.inf if self.is_confirmed else self.log_odds - math.log(self.miss_probability)
 
     def add_detection(
         self, label: str, rates: ErrorRates, viewpoint: str = "", *, is_ambiguous: bool = False

@@ -162,7 +162,7 @@ def _may_be_same_object(
     is_missing = (
         (old_item.state in ON_TABLE or is_pushed_phantom)
         and old_item.belief.miss_probability <= MAX_MISS_PROBABILITY_OF_MOVED_ITEM
-        and old_item.belief.probability_at_last_detection >= 0.5
+        and old_item.belief.log_odds_at_last_detection >= 0.0
     )
     if not is_missing or may_be_moved_by_person:
         return is_missing
