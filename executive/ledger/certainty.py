@@ -1,10 +1,10 @@
-"""Decisions whether the evidence about an item suffices, and final states of the items."""
+"""Decisions whether the evidence about an item suffices."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from executive.cell.config import LedgerConfig
 from executive.cell.tools import ToolMeasurement
@@ -48,10 +48,12 @@ class Certainty:
     Attributes:
         config: Thresholds of the ledger, from the cell file.
         distinct_labels: Classes that a measurement of the tool distinguishes from all others.
+        confirmed_labels: Classes that a measurement of the tool has confirmed, and "" after others.
     """
 
     config: LedgerConfig
     distinct_labels: Collection[str]
+    confirmed_labels: set[str] = field(default_factory=set)
 
     def is_certain(self, record: ItemRecord) -> bool:
         """Return True if an item's existence, class and position are certain enough to touch the item.
@@ -142,6 +144,7 @@ class Certainty:
         if not measurement.contradiction:
             record.confirmed_label = record.label
             record.doubtful_measurement_count = 0
+        self.confirmed_labels.add(record.confirmed_label)
         if record.confirmed_label == record.label:
             return True
         if measurement.may_be_wrong:

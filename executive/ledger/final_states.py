@@ -28,7 +28,6 @@ def set_final_states(
     undeclared_labels: Collection[str],
     *,
     is_completed: bool,
-    has_confirmed_item: bool,
 ) -> None:
     """Set and emit the final state of each item.
 
@@ -38,18 +37,14 @@ def set_final_states(
         explain_skipped_item: Function that returns the reason why the mission does not sort an item, or "".
         undeclared_labels: Classes that the cell does not declare.
         is_completed: True if the behaviour tree succeeded.
-        has_confirmed_item: True if a measurement of the tool has confirmed the class of any item.
     """
     dropped = records.filter_by_state(State.DROPPED)
     dropped_items = [record for record in dropped if not record.was_taken_away]
     for record in records.all:
+        skip_reason = explain_skipped_item(record)
+        is_declared = record.label not in undeclared_labels
         final_state = find_final_state(
-            record,
-            certainty,
-            skip_reason=explain_skipped_item(record),
-            is_declared=record.label not in undeclared_labels,
-            is_completed=is_completed,
-            has_confirmed_item=has_confirmed_item,
+            record, certainty, skip_reason, is_declared=is_declared, is_completed=is_completed
         )
         if bin := find_probable_bin(record):
             record.bin = bin
@@ -61,13 +56,7 @@ def set_final_states(
 
 
 def find_final_state(
-    record: ItemRecord,
-    certainty: Certainty,
-    *,
-    skip_reason: str,
-    is_declared: bool,
-    is_completed: bool,
-    has_confirmed_item: bool,
+    record: ItemRecord, certainty: Certainty, skip_reason: str, *, is_declared: bool, is_completed: bool
 ) -> tuple[State, str] | None:
     """Return the final state of an item and the reason, or None if the current state is final.
 
@@ -95,7 +84,6 @@ def find_final_state(
         skip_reason: Reason why the mission does not sort objects of the item's class, or "".
         is_declared: True if the cell declares the item's class.
         is_completed: True if the behaviour tree succeeded.
-        has_confirmed_item: True if a measurement of the tool has confirmed the class of any item.
     """
     belief = record.belief
     if record.state is State.HELD:
@@ -106,7 +94,8 @@ def find_final_state(
         return State.REJECTED, REASON_UNCERTAIN
     if not belief.is_probable and belief.removal_probability < 0.5:
         return State.PHANTOM, REASON_NOT_FOUND
-    if record.empty_probe_count >= MIN_EMPTY_PROBES and has_confirmed_item and not record.had_contact:
+    is_untouched = any(certainty.confirmed_labels) and not record.had_contact
+    if record.empty_probe_count >= MIN_EMPTY_PROBES and is_untouched:
         count = record.empty_probe_count
         return State.PHANTOM, f"the tool found only the table at its position, {count} times"
     if record.state is State.DROPPED or certainty.is_position_empty(record) or not belief.is_probable:

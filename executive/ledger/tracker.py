@@ -74,8 +74,6 @@ class Tracker:
         )
         self.unexplained = Unexplained(self.emit)
         self._load_cell = LoadCell(self.classes, self._certainty, self.unexplained)
-        self._confirmed_labels: set[str] = set()
-        """Classes that a measurement of the tool has confirmed, and "" after other measurements."""
         self._last_frame_id = 0
         self._last_stamp = 0.0
         """Capture time of the last look [s]."""
@@ -153,9 +151,7 @@ class Tracker:
 
     def record_measurement(self, item: Item, measurement: ToolMeasurement) -> bool:
         record = self._records.find(item)
-        is_confirmed = self._certainty.add_measurement(record, measurement)
-        self._confirmed_labels.add(record.confirmed_label)
-        if is_confirmed:
+        if self._certainty.add_measurement(record, measurement):
             return True
         self._coverage.record_change(record.position, self.config.neighbourhood)
         self._records.emit(record)
@@ -284,7 +280,7 @@ class Tracker:
             self.assumption_reasons.append(assumption)
         set_final_states(
             self._records, self._certainty, self._explain_skipped_item, self.unknown_labels,
-            is_completed=completed, has_confirmed_item=any(self._confirmed_labels),
+            is_completed=completed,
         )  # fmt: skip
         missed = [record for record in self._records.all if record.may_have_left]
         for record in (each for each in missed if each.label not in self.unknown_labels):
@@ -353,7 +349,7 @@ class Tracker:
         return self._certainty.is_certain(self._records.find(item))
 
     def is_confirmed_by_tool(self, label: str) -> bool:
-        return label in self._confirmed_labels
+        return label in self._certainty.confirmed_labels
 
     def is_table_empty(self, label: str | None = None, ignored_items: Collection[Item] = ()) -> bool:
         routed_labels = [routed_label for routed_label in self.routes if label in (None, routed_label)]
