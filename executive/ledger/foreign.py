@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 
 from executive.cell.config import LedgerConfig
 from executive.cell.frame import Detections, Observation
@@ -24,47 +25,38 @@ MIN_LOOKS_WITHOUT_CLASS = 3
 """Minimum number of looks that show an item of no class before the table counts as searched."""
 
 
+@dataclass(eq=False)
 class ForeignObjects:
     """Records detections whose labels the cell file ignores or does not declare, and other obstacles.
 
-    Args:
+    Attributes:
         config: Thresholds of the ledger.
         bins, classes: The bins by name, and the classes by label.
         coverage: Knows the workspace.
-
-    Attributes:
         ignored_labels: Labels that are not in the cell file, of objects that may lie on the table.
         ignored_positions: Positions `(3,)` [m] of all detections with an ignored label so far.
         unknown_labels: Other labels that are not in the cell file, each with its maximum number of boxes per
             frame.
+        bodies: Objects of no item: position `(3,)` [m], and number of further looks until it is forgotten.
     """
 
-    def __init__(
-        self,
-        config: LedgerConfig,
-        bins: Mapping[str, Bin],
-        classes: Mapping[str, ObjectClass],
-        coverage: Coverage,
-        ignored_labels: Collection[str],
-    ) -> None:
-        self.ignored_labels = ignored_labels
-        self.ignored_positions: list[Array] = []
-        self.unknown_labels: Counter[str] = Counter()
-        self._config = config
-        self._bins = bins
-        self._classes = classes
-        self._coverage = coverage
-        self._bodies: list[tuple[Array, int]] = []
-        """Objects of no item: position `(3,)` [m], and number of further looks until it is forgotten."""
+    config: LedgerConfig
+    bins: Mapping[str, Bin]
+    classes: Mapping[str, ObjectClass]
+    coverage: Coverage
+    ignored_labels: Collection[str]
+    ignored_positions: list[Array] = field(default_factory=list)
+    unknown_labels: Counter[str] = field(default_factory=Counter)
+    bodies: list[tuple[Array, int]] = field(default_factory=list)
 
     @property
     def positions(self) -> list[Array]:
         """Position `(3,)` [m] of each object of no item, the last one first."""
-        return [position for position, _ in reversed(self._bodies)]
+        return [position for position, _ in reversed(self.bodies)]
 
     def forget_old(self) -> None:
         """Count a look, and forget objects that too many looks did not show again."""
-        self._bodies = [(position, count - 1) for position, count in self._bodies if count > 1]
+        self.bodies = [(position, count - 1) for position, count in self.bodies if count > 1]
 
     def record_unknown_labels(self, detections: Detections) -> None:
         """Count the boxes of a frame with labels that are neither declared nor ignored."""
@@ -79,13 +71,13 @@ class ForeignObjects:
             self.ignored_positions.append(entry.position)
             box = entry.detection.box
             is_object = box[2] - box[0] < MAX_BODY_WIDTH * (detections.area[2] - detections.area[0])
-            if is_object and self._coverage.is_in_workspace(entry.position):
+            if is_object and self.coverage.is_in_workspace(entry.position):
                 self.add(entry.position, targets)
 
     def add(self, position: Array, targets: Collection[Target]) -> None:
         """Record an object of no item at `position` `(3,)` [m], unless an item or a bin is there."""
         if self.is_separate(position, [target for target in targets if target.label]):
-            self._bodies.append((position, BODY_LOOK_COUNT))
+            self.bodies.append((position, BODY_LOOK_COUNT))
 
     def omit_ignored(self, observations: Sequence[Observation]) -> list[Observation]:
         """Return the observations without those with an ignored label."""
@@ -103,7 +95,7 @@ class ForeignObjects:
         items = [each for each in targets if each.label not in ("", *self.unknown_labels)]
         for entry in (entry for entry in observations if entry.detection.label in self.unknown_labels):
             is_separate = self.is_separate(entry.position, (*items, *kept))
-            if is_separate and self._coverage.is_in_workspace(entry.position):
+            if is_separate and self.coverage.is_in_workspace(entry.position):
                 kept.append(entry)
         return kept
 
@@ -112,10 +104,10 @@ class ForeignObjects:
 
         Positions higher than the tallest class above the centre of a target show another, taller object.
         """
-        radii = [each.radius for each in self._classes.values()]
-        margin = max([AMBIGUITY_FACTOR * self._config.gate, *radii])
-        is_in_bin = any(bin.contains(position, margin) for bin in self._bins.values())
-        height = max((each.height for each in self._classes.values()), default=math.inf)
+        radii = [each.radius for each in self.classes.values()]
+        margin = max([AMBIGUITY_FACTOR * self.config.gate, *radii])
+        is_in_bin = any(bin.contains(position, margin) for bin in self.bins.values())
+        height = max((each.height for each in self.classes.values()), default=math.inf)
         near = [each for each in targets if math.dist(position[:2], each.position[:2]) <= margin]
         return not is_in_bin and all(position[2] > each.position[2] + height for each in near)
 
