@@ -187,8 +187,7 @@ def _make_camera_offset(fit: PoseFit, frame: Frame, bins: Sequence[Bin]) -> Came
 def compute_bin_mask(frame: Frame, bin: Bin) -> NDArray[np.bool_]:
     """Return the mask `(H, W)` of the pixels of a bin."""
     size = (frame.visible.shape[1], frame.visible.shape[0])
-    mask = compute_hull_mask(list_corners(bin), frame.matrix, frame.X_WC, size, may_be_cut=True)
-    return np.zeros_like(frame.visible) if mask is None else mask
+    return compute_hull_mask(list_corners(bin), frame.matrix, frame.X_WC, size, may_be_cut=True)
 
 
 class EdgeSamples(NamedTuple):

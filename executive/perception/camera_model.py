@@ -118,17 +118,17 @@ def project(matrix: Array, X_WC: Pose, points: ArrayLike) -> Array:
 
 def compute_hull_mask(
     corners: Array, matrix: Array, X_WC: Pose, size: tuple[int, int], *, may_be_cut: bool = False
-) -> NDArray[np.bool_] | None:
+) -> NDArray[np.bool_]:
     """Return the mask `(H, W)` of the pixels in the convex hull of world points `(N, 3)` [m].
 
-    Return None if the camera does not see all points; with `may_be_cut`, only if a point is behind it.
+    The mask is empty if the camera does not see all points; with `may_be_cut`, only if a point is behind it.
     """
+    mask = np.zeros((size[1], size[0]), dtype=np.uint8)
     if np.any(X_WC.inverse().apply(corners)[:, 2] <= 0):
-        return None
+        return mask.astype(bool)
     pixels = project(matrix, X_WC, corners)
     if not may_be_cut and (np.any(pixels < 0) or np.any(pixels >= np.array(size))):
-        return None
-    mask = np.zeros((size[1], size[0]), dtype=np.uint8)
+        return mask.astype(bool)
     cv2.fillConvexPoly(mask, cv2.convexHull(np.round(pixels).astype(np.int32)), 1)
     return mask.astype(bool)
 

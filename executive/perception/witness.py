@@ -80,8 +80,10 @@ def find_unexplained(
     size = (frame.visible.shape[1] // REDUCTION, frame.visible.shape[0] // REDUCTION)
     matrix = frame.matrix.copy()
     matrix[:2] /= REDUCTION
-    searched_mask = _compute_searched_mask(frame, matrix, size, table)
-    if searched_mask is None:
+    margins = np.array([-SEARCH_MARGIN, SEARCH_MARGIN])
+    corners = np.array([(x, y, 0.0) for x in table.x + margins for y in table.y + margins])
+    searched_mask = compute_hull_mask(corners, matrix, frame.X_WC, size, may_be_cut=True)
+    if not searched_mask.any():
         return []
     visible_mask = cv2.resize(frame.visible.astype(np.uint8), size, interpolation=cv2.INTER_AREA) > 0
     scale = float(matrix[0, 0]) / frame.compute_depth(np.array([sum(table.x) / 2, sum(table.y) / 2, 0.0]))
@@ -89,9 +91,7 @@ def find_unexplained(
     cylinders = (_list_cylinder_points(obstacle) for obstacle in obstacles)
     known_mask = np.zeros(searched_mask.shape, dtype=np.uint8)
     for points in (*map(list_corners, bins), *cylinders):
-        mask = compute_hull_mask(points, matrix, frame.X_WC, size, may_be_cut=True)
-        if mask is not None:
-            known_mask |= mask.astype(np.uint8)
+        known_mask |= compute_hull_mask(points, matrix, frame.X_WC, size, may_be_cut=True)
     explained_mask = np.asarray(cv2.dilate(known_mask, np.ones((2 * margin + 1,) * 2)), dtype=np.uint8)
     # The known objects stand for the detections of known classes: the ledger may not believe a detection.
     for detection in look.unknown:
@@ -106,15 +106,6 @@ def find_unexplained(
     min_area = MIN_AREA_FRACTION * math.pi * (min_radius * scale) ** 2
     found = _list_components(raised_mask & unexplained_mask, border_mask, min_area, MAX_SIDE * scale)
     return [_make_region(frame, box) for box in found]
-
-
-def _compute_searched_mask(
-    frame: Frame, matrix: Array, size: tuple[int, int], table: TableConfig
-) -> NDArray[np.bool_] | None:
-    """Return the mask of the workspace and its margin; None if a part of it is behind the camera."""
-    margins = np.array([-SEARCH_MARGIN, SEARCH_MARGIN])
-    corners = np.array([(x, y, 0.0) for x in table.x + margins for y in table.y + margins])
-    return compute_hull_mask(corners, matrix, frame.X_WC, size, may_be_cut=True)
 
 
 def _find_deviations(

@@ -126,7 +126,7 @@ class CellCamera:
         robot = self._unrecorded_robot
         X_WC = self._compute_pose(robot.arm.q)
         mask = compute_hull_mask(self._workspace_corners, self.matrix, X_WC, self._size)
-        return mask is not None and bool(np.all(self._compute_visibility_mask(robot, X_WC)[mask]))
+        return bool(mask.any() and np.all(self._compute_visibility_mask(robot, X_WC)[mask]))
 
     def capture(self) -> Frame:
         """Capture an image, and return the frame."""

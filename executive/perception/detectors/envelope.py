@@ -94,7 +94,8 @@ def compute_frame_statistics(frame: Frame, cell: CellConfig) -> Mapping[str, flo
     corners = np.array([(x, y, 0.0) for x in cell.table.x for y in cell.table.y])
     mask = compute_hull_mask(corners, frame.matrix, frame.X_WC, (width, height), may_be_cut=is_partial)
     min_pixels = MIN_FRACTION_OF_PARTIAL_VIEW * width * height if is_partial else MIN_PIXELS
-    if mask is None or np.count_nonzero(mask := mask & frame.visible) < min_pixels:
+    mask &= frame.visible
+    if np.count_nonzero(mask) < min_pixels:
         return None
     # Image noise would increase the contrast; the mean of 3 x 3 pixels removes most of the noise.
     colours = cv2.blur(frame.image, (3, 3))[mask].astype(float)
