@@ -98,14 +98,11 @@ class Unexplained:
             text: Sentence for the result of the run, or "".
             frame: Number of the frame that shows it; 0 for none.
         """
-        entry = self._entries.get(key)
         if not text:
             self._close(key)
-        elif entry is None:
-            self._count += 1
-            self._entries[key] = Entry(UnexplainedChanged(f"unexplained-{self._count}", text, [], frame))
-            self._emit(self._entries[key].event)
-        elif entry.event.text != text:
+            return
+        entry = self._entries.get(key) or self._open(key)
+        if entry.event.text != text:
             entry.event = UnexplainedChanged(entry.event.name, text, [], frame)
             self._emit(entry.event)
 
@@ -130,22 +127,22 @@ class Unexplained:
             position = entry.position
             distances = [math.dist(position[:2], region.position[:2]) for region in new_regions]
             if distances and min(distances) <= max_distance:
-                region = new_regions.pop(distances.index(min(distances)))
-                entry.look_count += 1
-                self._show(entry, region, look.frame.id)
+                self._show(entry, new_regions.pop(distances.index(min(distances))), look.frame.id)
             elif look.compute_searched_mask(position[None])[0]:
                 entry.miss_count += 1
                 if entry.miss_count >= entry.look_count:
                     self._close(key)
         for region in new_regions:
-            self._count += 1
-            name = f"unexplained-{self._count}"
-            entry = Entry(UnexplainedChanged(name, region.text, []), region.position, look_count=1)
-            self._entries[name] = entry
-            self._show(entry, region, look.frame.id)
+            self._show(self._open(f"region {self._count + 1}"), region, look.frame.id)
         self._unsettled_look_count += 1
         if all(entry.is_settled for entry in self._entries.values()):
             self._unsettled_look_count = 0
+
+    def _open(self, key: str) -> Entry:
+        """Return a new entry with the next name; the caller emits its first event."""
+        self._count += 1
+        self._entries[key] = Entry(UnexplainedChanged(f"unexplained-{self._count}", "", []))
+        return self._entries[key]
 
     def _close(self, key: str) -> None:
         """Close the entry with a key, if there is one."""
@@ -155,12 +152,13 @@ class Unexplained:
             self._emit(UnexplainedChanged(event.name, event.text, event.position, is_open=False))
 
     def _show(self, entry: Entry, region: Region, frame: int) -> None:
-        """Emit an entry whose region a frame shows."""
+        """Count a look that shows the region of an entry, and emit the entry."""
         position = round_values(region.position, 4)
         box = round_values(region.box, 1)
         text = region.text
         if entry.touch_height is not None:
             text += f"; the tool touched it at {entry.touch_height * 1000:.0f} mm"
+        entry.look_count += 1
         entry.position = region.position
         entry.event = UnexplainedChanged(entry.event.name, text, position, frame, box)
         self._emit(entry.event)
