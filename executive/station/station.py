@@ -156,9 +156,7 @@ class Station:
             planner: Any = None
             detectors: Mapping[str, Any] = dict.fromkeys(config.detectors)
             cast_ray = None
-            weights = {
-                label: each.mass * GRAVITY for label, each in classes.items() if math.isfinite(each.mass_std)
-            }
+            masses = {label: each.mass for label, each in classes.items() if math.isfinite(each.mass_std)}
             is_without_physics = kind is not None and is_rehearsal(kind)
             if options.has_devices:
                 kind = kind or load_driver_kind(config.kind)
@@ -166,7 +164,6 @@ class Station:
                 if (compute_mass := getattr(kind, "compute_mass", None)) is not None:
                     masses = {label: compute_mass(section) for label, section in config.objects.items()}
                     classes = {label: replace(each, mass=masses[label]) for label, each in classes.items()}
-                    weights = {label: mass * GRAVITY for label, mass in masses.items()}
                 driver_options = DriverOptions(seed, options.cell_folder, options.driver_options)
                 self.driver = kind(config, driver_options)
                 resources.callback(self.driver.close)
@@ -234,7 +231,9 @@ class Station:
                 empty_bins=self.empty_bins,
                 quotas=options.quotas,
                 # A replay has no driver, which may know the masses of objects.
-                get_weight=lambda label: self.border.read(f"weight.{label}", lambda: weights.get(label, 0.0)),
+                get_weight=lambda label: self.border.read(
+                    f"weight.{label}", lambda: masses.get(label, 0.0) * GRAVITY
+                ),
                 behaviours=self.border.wrap("behaviours", Behaviours()),
             )
             self.unrecorded_cell = replace(
