@@ -6,7 +6,6 @@ import contextlib
 import heapq
 import math
 import time
-from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -93,7 +92,7 @@ def evaluate(
     errors = ErrorStatistics(localizer)
     average_precision = AveragePrecision()
     statistics_of_frames: list[Mapping[str, float]] = []
-    witness_counts = WitnessStatistics()
+    witness = None if cell is None else WitnessCounts(objects={}, false_regions=0)
     latencies: list[float] = []
     unavailable_reasons: list[str] = []
     min_confidence = detector.threshold if threshold is None else threshold
@@ -115,8 +114,8 @@ def evaluate(
         errors.add(matches, second_matches, sample, frame)
         if cell is not None and (frame_statistics := compute_frame_statistics(frame, cell)):
             statistics_of_frames.append(frame_statistics)
-        if cell is not None:
-            witness_counts.add(sample, frame, cell)
+        if cell is not None and witness is not None:
+            witness = _add_witness_counts(witness, sample, frame, cell)
         if mistakes is not None:
             collect_mistakes(mistakes, matches, sample)
     map50, map50_95 = average_precision.compute()
@@ -140,7 +139,7 @@ def evaluate(
         by_count={count: dict(counts) for count, counts in errors.counts_by_object_count.items()},
         reliability=errors.estimate_error_rates(),
         frames=FrameRange.compute(statistics_of_frames),
-        witness=witness_counts.to_counts() if cell is not None else None,
+        witness=witness,
     )
 
 
@@ -152,33 +151,24 @@ def _match_confident(
     return match_detections([entry for entry in confident if not is_ignored(entry, sample)], sample)
 
 
-class WitnessStatistics:
-    """Number of objects that the witness of an empty table finds when no detection shows them."""
+def _add_witness_counts(
+    counts: WitnessCounts, sample: LabelledImage, frame: Frame, cell: CellConfig
+) -> WitnessCounts:
+    """Return the counts with an image: searched with all objects known, then without each visible object.
 
-    def __init__(self) -> None:
-        self._found: Counter[str] = Counter()
-        self._total: Counter[str] = Counter()
-        self._false_count = 0
-
-    def add(self, sample: LabelledImage, frame: Frame, cell: CellConfig) -> None:
-        """Add an image: search it with all objects known, then without each completely visible object.
-
-        An object at another one does not count: with the other one known, it is no region of its own.
-        """
-        boxes = [*sample.boxes, *sample.ignored_boxes]
-        has_neighbour = (compute_overlaps(boxes)[0] > 0).sum(axis=1) > 1
-        self._false_count += len(_find_unexplained(frame, boxes, cell))
-        for index, label in enumerate(sample.labels):
-            if sample.is_fully_visible(index) and not has_neighbour[index]:
-                regions = _find_unexplained(frame, boxes[:index] + boxes[index + 1 :], cell)
-                overlaps = compute_overlaps([boxes[index], *(region.box for region in regions)])[0][0, 1:]
-                self._total[label] += 1
-                self._found[label] += bool((overlaps > 0).any())
-
-    def to_counts(self) -> WitnessCounts:
-        """Return the counts for a measurement file."""
-        objects = {label: (self._found[label], total) for label, total in sorted(self._total.items())}
-        return WitnessCounts(objects=objects, false_regions=self._false_count)
+    An object at another one does not count: with the other one known, it is no region of its own.
+    """
+    boxes = [*sample.boxes, *sample.ignored_boxes]
+    has_neighbour = (compute_overlaps(boxes)[0] > 0).sum(axis=1) > 1
+    false_count = counts.false_regions + len(_find_unexplained(frame, boxes, cell))
+    objects = dict(counts.objects)
+    for index, label in enumerate(sample.labels):
+        if sample.is_fully_visible(index) and not has_neighbour[index]:
+            regions = _find_unexplained(frame, boxes[:index] + boxes[index + 1 :], cell)
+            overlaps = compute_overlaps([boxes[index], *(region.box for region in regions)])[0][0, 1:]
+            found_count, total = objects.get(label, (0, 0))
+            objects[label] = (found_count + bool((overlaps > 0).any()), total + 1)
+    return WitnessCounts(objects=dict(sorted(objects.items())), false_regions=false_count)
 
 
 def _find_unexplained(frame: Frame, boxes: Sequence[Box], cell: CellConfig) -> list[Region]:
