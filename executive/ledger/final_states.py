@@ -6,14 +6,7 @@ from collections.abc import Callable, Collection, Mapping
 
 from executive.ledger.bin_contents import REASON_PROBABLY_FELL, find_probable_bin
 from executive.ledger.certainty import REASON_CONTRADICTED, Certainty
-from executive.ledger.item import (
-    ON_TABLE,
-    REASON_NOT_FOUND,
-    REASON_UNCERTAIN,
-    ItemRecord,
-    ItemRecords,
-    State,
-)
+from executive.ledger.item import ON_TABLE, REASON_NOT_FOUND, REASON_UNCERTAIN, ItemRecord, ItemRecords, State
 
 MIN_EMPTY_PROBES = 3
 """Minimum number of descents that touched only the table (`ItemRecord.empty_probe_count`) at a phantom."""

@@ -16,22 +16,11 @@ from executive.cell.devices import sleep_on
 from executive.cell.objects import Item
 from executive.cell.protocols import Cell, Steps
 from executive.errors import Fault, Interrupted, Stopped, describe_error
-from executive.events import (
-    Event,
-    Observer,
-    RunEnded,
-    RunStarted,
-    TimedEvent,
-)
+from executive.events import Event, Observer, RunEnded, RunStarted, TimedEvent
 from executive.ledger.final_states import is_balanced
 from executive.ledger.tracker import Tracker
 from executive.manipulation.motions import make_transport_task
-from executive.manipulation.tool_goals import (
-    choose_grasp,
-    make_bin_goal,
-    sort_by_tour,
-    sort_pickable_targets,
-)
+from executive.manipulation.tool_goals import choose_grasp, make_bin_goal, sort_by_tour, sort_pickable_targets
 from executive.processes import shorten_collections
 from executive.run.operator import RunControl, halt_on_signals, limit_tick_time
 from executive.station.station import Station

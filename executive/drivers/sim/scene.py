@@ -25,11 +25,7 @@ from executive.cell.device_config import (
     check_ascending,
 )
 from executive.drivers.sim.camera import Light
-from executive.drivers.sim.models import (
-    DAMAGED_MODEL_NUMBER,
-    UNKNOWN_MODEL_COUNT,
-    scale_model,
-)
+from executive.drivers.sim.models import DAMAGED_MODEL_NUMBER, UNKNOWN_MODEL_COUNT, scale_model
 from executive.drivers.sim.world import TEXTURES, WOOD_TEXTURE, World
 from executive.geometry import Pose
 from executive.perception.camera_model import (
