@@ -14,9 +14,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell.config import TableConfig
+from executive.cell.config import CellConfig
 from executive.cell.frame import Box, Detections, Frame, Region
-from executive.cell.objects import Bin, Obstacle
+from executive.cell.objects import Obstacle
 from executive.geometry import Array
 from executive.perception.camera_check import list_corners
 from executive.perception.camera_model import compute_heights, compute_hull_mask, intersect_plane
@@ -60,23 +60,16 @@ BOX_MARGIN = 2.0
 """Width of the margin around a detection that it explains [pixel]."""
 
 
-def find_unexplained(
-    look: Detections,
-    table: TableConfig,
-    bins: Collection[Bin],
-    obstacles: Collection[Obstacle],
-    min_radius: float,
-) -> list[Region]:
+def find_unexplained(look: Detections, config: CellConfig, obstacles: Collection[Obstacle]) -> list[Region]:
     """Return the regions of a frame that table, arm, bins, objects and unknown classes do not explain.
 
     Args:
         look: The detections with their frame.
-        table: The workspace.
-        bins: Bins of the cell.
+        config: The cell file, which declares workspace, bins and sizes of the classes.
         obstacles: Known objects on the table.
-        min_radius: Radius of the smallest class [m].
     """
     frame = look.frame
+    table = config.table
     size = (frame.visible.shape[1] // REDUCTION, frame.visible.shape[0] // REDUCTION)
     matrix = frame.matrix.copy()
     matrix[:2] /= REDUCTION
@@ -90,7 +83,7 @@ def find_unexplained(
     margin = round(EXPLAINED_MARGIN * scale)
     cylinders = (_list_cylinder_points(obstacle) for obstacle in obstacles)
     known_mask = np.zeros(searched_mask.shape, dtype=np.uint8)
-    for points in (*map(list_corners, bins), *cylinders):
+    for points in (*map(list_corners, config.build_bins().values()), *cylinders):
         known_mask |= compute_hull_mask(points, matrix, frame.X_WC, size, may_be_cut=True)
     explained_mask = np.asarray(cv2.dilate(known_mask, np.ones((2 * margin + 1,) * 2)), dtype=np.uint8)
     # The known objects stand for the detections of known classes: the ledger may not believe a detection.
@@ -103,6 +96,7 @@ def find_unexplained(
         raised_mask |= _find_raised(frame, frame.depth)
     # A region at the border of the searched part may continue there, as floor and arm do.
     border_mask = cv2.dilate((~(searched_mask & visible_mask)).astype(np.uint8), np.ones((3, 3))) > 0
+    min_radius = min(section.radius for section in config.objects.values())
     min_area = MIN_AREA_FRACTION * math.pi * (min_radius * scale) ** 2
     found = _list_components(raised_mask & unexplained_mask, border_mask, min_area, MAX_SIDE * scale)
     return [_make_region(frame, box) for box in found]

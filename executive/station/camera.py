@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from executive.cell.config import CellConfig
 from executive.cell.devices import ArmDevice, CameraDevice, CameraImage
 from executive.cell.frame import BinAppearance, Box, Detections, Frame, Region, TrueFrame
-from executive.cell.objects import Bin, Obstacle
+from executive.cell.objects import Obstacle
 from executive.cell.protocols import Tool
 from executive.errors import WrongImage
 from executive.geometry import Array, Pose
@@ -44,18 +44,16 @@ class Robot(NamedTuple):
 
 
 class CellCamera:
-    """A camera of a cell, with frames numbered from 1; implements `executive.cell.protocols.Camera`.
+    """The first camera of a cell, with frames numbered from 1; implements `executive.cell.protocols.Camera`.
 
     Args:
         config: The cell file.
-        name: Name of the camera in the cell file.
         device: The camera of the driver.
         robot: The arm, whose flange is the mount of a wrist camera, and the tool. An object that the tool
             holds is assumed to be of the largest class.
         unrecorded_robot: The same arm and tool, whose reads are not recorded, for `sees_table`: the answer
             itself is recorded.
         kinematics: Kinematics of the arm.
-        bins: Bins that serve as landmarks for the detection of a displaced camera.
         get_change_count: Returns the number of changes of the objects on the table so far.
         is_hidden_by_arm: False if the arm hides nothing, as in a cell without physics.
 
@@ -69,25 +67,22 @@ class CellCamera:
     def __init__(
         self,
         config: CellConfig,
-        name: str,
         device: CameraDevice,
         robot: Robot,
         unrecorded_robot: Robot,
         kinematics: Kinematics,
         *,
-        bins: Collection[Bin] = (),
         get_change_count: Callable[[], int] = lambda: 0,
         is_hidden_by_arm: bool = True,
     ) -> None:
-        self.name = name
-        self.config = config.cameras[name]
+        self.name, self.config = next(iter(config.cameras.items()))
         self.scan_poses = self.config.scan_poses
         self.matrix, self._X_MC = compute_calibration(self.config)
         self._device = device
         self._robot = robot
         self._unrecorded_robot = unrecorded_robot
         self._kinematics = kinematics
-        self._bins = tuple(bins)
+        self._bins = tuple(config.build_bins().values())
         self._get_change_count = get_change_count
         self._is_hidden_by_arm = is_hidden_by_arm
         # T is the frame of the tool, F the frame of the flange.
@@ -98,8 +93,7 @@ class CellCamera:
         self._load_height = config.max_hold_height
         heights = (0.0, config.max_pile_height)
         self._workspace_corners = np.array(list(itertools.product(config.table.x, config.table.y, heights)))
-        self._table = config.table
-        self._min_radius = min(section.radius for section in config.objects.values())
+        self._cell_config = config
         self._frame_count = 0
         self._last_frame: Frame | None = None
         """Last frame that was compared with the frame before."""
@@ -181,7 +175,7 @@ class CellCamera:
         """Return the regions of a frame that no detection and no obstacle explains; none without physics."""
         if not self._is_hidden_by_arm:
             return []
-        return find_unexplained(look, self._table, self._bins, obstacles, self._min_radius)
+        return find_unexplained(look, self._cell_config, obstacles)
 
     def inspect_bins(self, frame: Frame) -> dict[str, BinAppearance]:
         """Return what a frame shows of the bins in view; nothing without physics."""

@@ -151,7 +151,7 @@ def _find_occluding_poses_and_bins(config: CellConfig, world: CellWorld) -> Iter
     robot: Any = _StillRobot(config)
     name = next(iter(config.cameras))
     build = build_kinematics(config)
-    camera = CellCamera(config, name, robot, Robot(robot, robot), Robot(robot, robot), build)
+    camera = CellCamera(config, robot, Robot(robot, robot), Robot(robot, robot), build)
 
     def move_to(pose: str) -> None:
         robot.q = np.radians(config.arm.poses_deg[pose])

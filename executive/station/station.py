@@ -196,12 +196,10 @@ class Station:
             recorded_tool = self.border.wrap("tool", tool)
             camera = CellCamera(
                 config,
-                camera_name,
                 self.border.wrap("image", camera_device),
                 Robot(recorded_arm, recorded_tool),
                 Robot(arm, tool),
                 kinematics,
-                bins=bins.values(),
                 get_change_count=lambda: self.ledger.change_count,
                 is_hidden_by_arm=not is_without_physics,
             )

@@ -177,8 +177,7 @@ def _find_unexplained(frame: Frame, boxes: Sequence[Box], cell: CellConfig) -> l
     detections = tuple(Detection("", 1.0, box) for box in boxes)
     area = (0.0, 0.0, float(width), float(height))
     look = Detections("", (), assume_rates(0.5, ""), unknown=detections, frame=frame, view="full", area=area)
-    min_radius = min(section.radius for section in cell.objects.values())
-    return find_unexplained(look, cell.table, cell.build_bins().values(), (), min_radius)
+    return find_unexplained(look, cell, ())
 
 
 class AveragePrecision:

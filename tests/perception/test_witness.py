@@ -13,13 +13,14 @@ from executive.cell.objects import Obstacle
 from executive.geometry import Array
 from executive.perception.camera_model import compute_camera_matrix, project
 from executive.perception.witness import find_unexplained
+from executive.testing.fake_cell import load_empty_cell
 from tests.camera_poses import looking_down
 
 X_WC = looking_down([0.5, 0.0, 1.2])
 MATRIX = compute_camera_matrix(640, 480, 55.0)
 TABLE_COLOUR = np.array([215.0, 195.0, 165.0])
 PLACE = np.array([0.53, 0.1, 0.0])
-BIN = BinConfig(position=(0.53, 0.1, 0.0), size=(0.2, 0.2, 0.06)).build_bin("bin")
+BIN = BinConfig(position=(0.53, 0.1, 0.0), size=(0.2, 0.2, 0.06))
 
 
 def draw(*patches: tuple[Array, float, Array], depth: Array | None = None) -> Frame:
@@ -37,13 +38,15 @@ def draw(*patches: tuple[Array, float, Array], depth: Array | None = None) -> Fr
 
 
 def search(
-    frame: Frame, *detections: Detection, bins: Sequence = (), obstacles: Sequence[Obstacle] = ()
+    frame: Frame, *detections: Detection, bins: Sequence[BinConfig] = (), obstacles: Sequence[Obstacle] = ()
 ) -> list[Region]:
     area = (0.0, 0.0, 640.0, 480.0)
     look = Detections(
         "eye", (), assume_rates(0.5, ""), unknown=detections, frame=frame, view="full", area=area
     )
-    return find_unexplained(look, TableConfig(), bins, obstacles, 0.03)
+    sections = {f"bin {index}": section for index, section in enumerate(bins)}
+    config = load_empty_cell().model_copy(update={"table": TableConfig(), "bins": sections})
+    return find_unexplained(look, config, obstacles)
 
 
 @pytest.mark.parametrize("difference", [(-20, -20, -20), (30, 0, 0), (0, 0, -25), (25, 40, 60)])

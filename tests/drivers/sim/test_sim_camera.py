@@ -133,11 +133,9 @@ def test_the_scan_poses_of_the_wrist_camera_show_the_floors_of_all_bins(
     world = build(wrist)
     q = np.radians(wrist.arm.poses_deg[pose])
     world.set_joint_positions(q)
-    (name,) = wrist.cameras
     still: Any = SimpleNamespace(q=q, holding=False)
     robot = Robot(still, still)
     device = SimCamera(world, wrist, StepClock(step=1.5), 0, CELL_LIGHT)
-    bins = wrist.build_bins().values()
-    camera = CellCamera(wrist, name, device, robot, robot, build_kinematics(wrist), bins=bins)
+    camera = CellCamera(wrist, device, robot, robot, build_kinematics(wrist))
     appearances = camera.inspect_bins(camera.capture())
     assert appearances == dict.fromkeys(wrist.bins, BinAppearance("", 0.0, is_whole=True))
