@@ -40,9 +40,8 @@ class LoadCell:
         self._classes = classes
         self._certainty = certainty
         self._unexplained = unexplained
-        self._has_weighed = False
-        self._is_checked = False
-        """True if an object was weighed whose class the looks prove."""
+        self._is_gain_proved: bool | None = None
+        """True if an object was weighed whose class the looks prove; None before the first weighing."""
         self._problem = ""
         """Sentence on the last object whose class the looks prove, if its weight contradicts the class."""
         self._last_weighing: Weighing | None = None
@@ -50,9 +49,8 @@ class LoadCell:
     @property
     def assumption(self) -> str:
         """Sentence on what the weights assume; "" if a known object proved the gain, or without weights."""
-        if not self._has_weighed or self._is_checked:
-            return ""
-        return "the load cell has the right gain: no known object proved it"
+        text = "the load cell has the right gain: no known object proved it"
+        return text if self._is_gain_proved is False else ""
 
     def record_empty_load(self, load: float) -> None:
         """Record the load of the empty tool [N], and report an item whose class another zero contradicts."""
@@ -73,15 +71,14 @@ class LoadCell:
 
         Return "" if the class is then certain, otherwise a sentence that states the contradiction.
         """
-        self._has_weighed = True
         is_proved = self._is_class_proved_by_looks(record)
+        self._is_gain_proved = self._is_gain_proved or is_proved
         label_map = {label: other.detected_label for label, other in self._classes.items()}
         record.belief.add_weighing(evidence.compute_weight_log_ratios(weight, std, self._classes), label_map)
         contradiction = "" if is_proved else self._problem
         if not self._certainty.is_class_certain_by_weight(record):
             contradiction = evidence.describe_weight(weight, record.label, self._classes)
         if is_proved:
-            self._is_checked = True
             self._problem = contradiction and f"the load cell may be wrong: {record.item}: {contradiction}"
         text = self._problem and f"{self._problem}; others may be wrong, too"
         self._unexplained.report("load cell", text)
