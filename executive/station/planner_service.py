@@ -72,10 +72,11 @@ class Plan:
         return self.future.result()
 
 
+@dataclass(eq=False)
 class PlannerService:
     """Plans motions of one arm in a worker thread, and keeps one plan for a later request.
 
-    Args:
+    Attributes:
         plan_motion: Function that plans a motion; called in the worker thread.
         clock: Clock of the devices.
         planning_time: Time from a request until its plan is ready [s].
@@ -83,19 +84,13 @@ class PlannerService:
         release: Function that releases the resources of the planner.
     """
 
-    def __init__(
-        self,
-        plan_motion: PlanMotion,
-        clock: DeviceClock,
-        planning_time: float,
-        emit: Emit,
-        release: Callable[[], None] = lambda: None,
-    ) -> None:
-        self._plan_motion = plan_motion
-        self._clock = clock
-        self._planning_time = planning_time
-        self._emit = emit
-        self._release = release
+    plan_motion: PlanMotion
+    clock: DeviceClock
+    planning_time: float
+    emit: Emit
+    release: Callable[[], None] = lambda: None
+
+    def __post_init__(self) -> None:
         self._worker = ThreadPoolExecutor(1, "planner")
         self._stored_plan: Plan | None = None
 
@@ -104,12 +99,12 @@ class PlannerService:
         stored_plan = self._stored_plan
         plan = self.plan_ahead(start, goal, task)
         self._stored_plan = None
-        request_time = self._clock.now
+        request_time = self.clock.now
 
         def report() -> None:
             duration = 0.0 if plan.future.exception() else plan.future.result().duration
-            delay = self._clock.now - request_time
-            self._emit(MotionPlanned(plan is stored_plan, round(delay, 4), round(duration, 4)))
+            delay = self.clock.now - request_time
+            self.emit(MotionPlanned(plan is stored_plan, round(delay, 4), round(duration, 4)))
 
         plan.report = report
         return plan
@@ -123,14 +118,14 @@ class PlannerService:
         if plan is not None:
             # A plan that the worker has already started cannot be cancelled, but nobody reads its result.
             plan.future.cancel()
-        future = self._worker.submit(self._plan_motion, start, goal, task)
-        self._stored_plan = Plan(query, self._clock, self._clock.now + self._planning_time, future)
+        future = self._worker.submit(self.plan_motion, start, goal, task)
+        self._stored_plan = Plan(query, self.clock, self.clock.now + self.planning_time, future)
         return self._stored_plan
 
     def close(self) -> None:
         """Cancel the plans that have not started, and end the planning thread, unless a plan does not end."""
         if shut_down(self._worker):
-            self._release()
+            self.release()
 
 
 class PlannedArm:
