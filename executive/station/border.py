@@ -102,17 +102,6 @@ def decode_observation(value: Any) -> Observation:
     )  # fmt: skip
 
 
-def encode_region(region: Region) -> list[Any]:
-    """Return the attributes of a region as a list."""
-    return [list(map(float, region.box)), region.position.tolist(), region.text]
-
-
-def decode_region(value: Any) -> Region:
-    """Return the region that `encode_region` encoded."""
-    box, position, text = value
-    return Region(tuple(box), decode_array(position), text)
-
-
 def encode_behaviour_step(step: BehaviourStep) -> dict[str, Any]:
     """Return the attributes of a step of a behaviour.
 
@@ -165,7 +154,8 @@ OBSERVATIONS = Codec(
     lambda values: list(map(decode_observation, values)),
 )
 REGIONS = Codec(
-    lambda regions: list(map(encode_region, regions)), lambda values: list(map(decode_region, values))
+    lambda regions: [[list(map(float, each.box)), each.position.tolist(), each.text] for each in regions],
+    lambda values: [Region(tuple(box), decode_array(position), text) for box, position, text in values],
 )
 BINS = Codec(
     lambda bins: {name: list(appearance) for name, appearance in bins.items()},
