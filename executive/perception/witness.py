@@ -8,14 +8,14 @@ form regions. Arm, bins, known objects and detections explain regions.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator
+from collections.abc import Iterable, Iterator
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from executive.cell.config import CellConfig
-from executive.cell.frame import Box, Detections, Frame, Region
+from executive.cell.frame import Box, Frame, Region
 from executive.cell.objects import Obstacle
 from executive.geometry import Array
 from executive.perception.camera_check import list_corners
@@ -60,15 +60,17 @@ BOX_MARGIN = 2.0
 """Width of the margin around a detection that it explains [pixel]."""
 
 
-def find_unexplained(look: Detections, config: CellConfig, obstacles: Collection[Obstacle]) -> list[Region]:
+def find_unexplained(
+    frame: Frame, boxes: Iterable[Box], config: CellConfig, obstacles: Iterable[Obstacle]
+) -> list[Region]:
     """Return the regions of a frame that table, arm, bins, objects and unknown classes do not explain.
 
     Args:
-        look: The detections with their frame.
+        frame: The searched frame.
+        boxes: Boxes of detections of unknown classes [pixel].
         config: The cell file, which declares workspace, bins and sizes of the classes.
         obstacles: Known objects on the table.
     """
-    frame = look.frame
     table = config.table
     size = (frame.visible.shape[1] // REDUCTION, frame.visible.shape[0] // REDUCTION)
     matrix = frame.matrix.copy()
@@ -87,8 +89,8 @@ def find_unexplained(look: Detections, config: CellConfig, obstacles: Collection
         known_mask |= compute_hull_mask(points, matrix, frame.X_WC, size, may_be_cut=True)
     explained_mask = np.asarray(cv2.dilate(known_mask, np.ones((2 * margin + 1,) * 2)), dtype=np.uint8)
     # The known objects stand for the detections of known classes: the ledger may not believe a detection.
-    for detection in look.unknown:
-        _fill_box(explained_mask, detection.box)
+    for box in boxes:
+        _fill_box(explained_mask, box)
     unexplained_mask = searched_mask & visible_mask & (explained_mask == 0)
     image = cv2.resize(frame.image, size, interpolation=cv2.INTER_AREA).astype(np.float32)
     raised_mask = _find_deviations(image, unexplained_mask, round(WINDOW * scale))

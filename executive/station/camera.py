@@ -175,7 +175,8 @@ class CellCamera:
         """Return the regions of a frame that no detection and no obstacle explains; none without physics."""
         if not self._is_hidden_by_arm:
             return []
-        return find_unexplained(look, self._cell_config, obstacles)
+        boxes = [detection.box for detection in look.unknown]
+        return find_unexplained(look.frame, boxes, self._cell_config, obstacles)
 
     def inspect_bins(self, frame: Frame) -> dict[str, BinAppearance]:
         """Return what a frame shows of the bins in view; nothing without physics."""

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from executive.cell.config import CellConfig, DetectorConfig
 from executive.cell.device_config import CameraConfig
-from executive.cell.frame import Box, Detection, Detections, Frame, Region, assume_rates
+from executive.cell.frame import Box, Detection, Frame
 from executive.cell.protocols import Localizer
 from executive.errors import Unavailable
 from executive.perception.detectors.detector_registry import build_kinds, close_kind
@@ -160,24 +160,15 @@ def _add_witness_counts(
     """
     boxes = [*sample.boxes, *sample.ignored_boxes]
     has_neighbour = (compute_overlaps(boxes)[0] > 0).sum(axis=1) > 1
-    false_count = counts.false_regions + len(_find_unexplained(frame, boxes, cell))
+    false_count = counts.false_regions + len(find_unexplained(frame, boxes, cell, ()))
     objects = dict(counts.objects)
     for index, label in enumerate(sample.labels):
         if sample.is_fully_visible(index) and not has_neighbour[index]:
-            regions = _find_unexplained(frame, boxes[:index] + boxes[index + 1 :], cell)
+            regions = find_unexplained(frame, boxes[:index] + boxes[index + 1 :], cell, ())
             overlaps = compute_overlaps([boxes[index], *(region.box for region in regions)])[0][0, 1:]
             found_count, total = objects.get(label, (0, 0))
             objects[label] = (found_count + bool((overlaps > 0).any()), total + 1)
     return WitnessCounts(objects=dict(sorted(objects.items())), false_regions=false_count)
-
-
-def _find_unexplained(frame: Frame, boxes: Sequence[Box], cell: CellConfig) -> list[Region]:
-    """Return the regions of a frame that the table, the bins and the given boxes do not explain."""
-    height, width = frame.visible.shape
-    detections = tuple(Detection("", 1.0, box) for box in boxes)
-    area = (0.0, 0.0, float(width), float(height))
-    look = Detections("", (), assume_rates(0.5, ""), unknown=detections, frame=frame, view="full", area=area)
-    return find_unexplained(look, cell, ())
 
 
 class AveragePrecision:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from executive.cell.config import BinConfig, TableConfig
-from executive.cell.frame import Detection, Detections, Frame, Region, assume_rates
+from executive.cell.frame import Box, Frame, Region
 from executive.cell.objects import Obstacle
 from executive.geometry import Array
 from executive.perception.camera_model import compute_camera_matrix, project
@@ -38,15 +38,11 @@ def draw(*patches: tuple[Array, float, Array], depth: Array | None = None) -> Fr
 
 
 def search(
-    frame: Frame, *detections: Detection, bins: Sequence[BinConfig] = (), obstacles: Sequence[Obstacle] = ()
+    frame: Frame, *boxes: Box, bins: Sequence[BinConfig] = (), obstacles: Sequence[Obstacle] = ()
 ) -> list[Region]:
-    area = (0.0, 0.0, 640.0, 480.0)
-    look = Detections(
-        "eye", (), assume_rates(0.5, ""), unknown=detections, frame=frame, view="full", area=area
-    )
     sections = {f"bin {index}": section for index, section in enumerate(bins)}
     config = load_empty_cell().model_copy(update={"table": TableConfig(), "bins": sections})
-    return find_unexplained(look, config, obstacles)
+    return find_unexplained(frame, boxes, config, obstacles)
 
 
 @pytest.mark.parametrize("difference", [(-20, -20, -20), (30, 0, 0), (0, 0, -25), (25, 40, 60)])
@@ -63,7 +59,7 @@ def test_an_empty_table_has_no_region() -> None:
 def test_an_unknown_class_a_known_object_or_a_bin_explains_a_region() -> None:
     frame = draw((PLACE, 0.05, np.zeros(3)))
     left, top = project(MATRIX, X_WC, [PLACE])[0] - 10
-    assert search(frame, Detection("cup", 0.6, (left, top, left + 20, top + 20))) == []
+    assert search(frame, (left, top, left + 20, top + 20)) == []
     assert search(frame, obstacles=[Obstacle(0.53, 0.1, 0.035, 0.05, "cube-1")]) == []
     assert search(frame, bins=[BIN]) == []
     assert search(frame, obstacles=[Obstacle(0.53, 0.0, 0.035, 0.05, "cube-1")])
