@@ -126,7 +126,6 @@ def _measure_contents(frame: Frame, bins: Sequence[Bin]) -> dict[str, tuple[floa
     A bin is missing in the result if too little of its floor is in view, or if objects cover most of it.
     """
     contents = {}
-    up = np.array([0.0, 0.0, 1.0])
     size = (frame.visible.shape[1] // REDUCTION, frame.visible.shape[0] // REDUCTION)
     matrix = frame.matrix.copy()
     matrix[:2] /= REDUCTION
@@ -138,18 +137,16 @@ def _measure_contents(frame: Frame, bins: Sequence[Bin]) -> dict[str, tuple[floa
         floor_mask = np.ones(visible.shape, dtype=bool)
         is_cut = False
         # The camera sees the floor through the opening of the bin.
-        for height in (BIN_THICKNESS, bin.size[2]):
-            polygon = rectangle + up * height
+        for z in (BIN_THICKNESS, bin.size[2]):
+            polygon = np.add(rectangle, (0.0, 0.0, z))
             pixels = project(matrix, frame.X_WC, polygon)
             is_cut |= bool(np.any((pixels < 0) | (pixels > size)))
-            mask = compute_hull_mask(polygon, matrix, frame.X_WC, size, may_be_cut=True)
-            floor_mask &= False if mask is None else mask
+            floor_mask &= compute_hull_mask(polygon, matrix, frame.X_WC, size, may_be_cut=True)
         if not floor_mask.any():
             continue
         scale = float(matrix[0, 0]) / frame.compute_depth(bin.position)
-        used_rows = np.flatnonzero(floor_mask.any(axis=1))
-        used_columns = np.flatnonzero(floor_mask.any(axis=0))
-        crop = np.s_[used_rows[0] : used_rows[-1] + 1, used_columns[0] : used_columns[-1] + 1]
+        left, top, width, height = cv2.boundingRect(floor_mask.astype(np.uint8))
+        crop = np.s_[top : top + height, left : left + width]
         floor_mask = floor_mask[crop]
         shown_mask = floor_mask & visible[crop]
         shown_fraction = shown_mask.sum() / (4 * half_size[0] * half_size[1] * scale**2)

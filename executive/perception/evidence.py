@@ -154,13 +154,9 @@ def describe_size_contradiction(
     if object_class.footprint is not None:
         return _describe_footprint_contradiction(detection, position, frame, object_class)
     left, top, right, bottom = detection.box
-    angles = np.linspace(0, 2 * math.pi, 16, endpoint=False)
-    x = object_class.radius * np.cos(angles)
-    y = object_class.radius * np.sin(angles)
-    half = object_class.height / 2
-    circles = [np.stack((x, y, np.full(16, z)), axis=1) for z in (-half, half)]
-    cylinder = project(frame.matrix, frame.X_WC, position + np.concatenate(circles))
-    projected_length = float(np.ptp(cylinder, axis=0).max())
+    half_height = object_class.height / 2
+    cylinder = _project_outlines(frame, position, object_class, [-half_height, half_height])[0]
+    projected_length = float(np.ptp(cylinder, axis=(0, 1)).max())
     scale = float(frame.matrix[0, 0]) / frame.compute_depth(position)
     min_length = math.sqrt(2) * object_class.radius * scale * (1 - SIZE_TOLERANCE) - SIZE_TOLERANCE_PX
     max_length = projected_length * (1 + SIZE_TOLERANCE) + SIZE_TOLERANCE_PX
