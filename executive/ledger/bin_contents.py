@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from executive.cell.config import LedgerConfig
-from executive.cell.frame import BinAppearance, Detections, ErrorRates, Observation
+from executive.cell.frame import BinAppearance, Detections, ErrorRates, Frame, Observation
 from executive.cell.ledger import Presence
 from executive.cell.objects import BIN_THICKNESS, Bin, Item, ObjectClass, Quotas, is_quota_reached
 from executive.cell.protocols import Routes
@@ -30,14 +30,14 @@ BIN_AREA_FRACTION = 0.04
 """Fraction of an image that a bin covers: probability that a false detection lies in the bin."""
 MIN_CHANGED_FRACTION = 0.5
 """Minimum change of the visible area in a bin, as a fraction of the area of the smallest class."""
-MIN_AREA_FACTOR = 0.7
-"""Minimum visible area of an object in a bin, as a multiple of the area of its outline from above."""
-MAX_AREA_FACTOR = 1.55
-"""Maximum visible area of an object in a bin, as a multiple of the circle around it.
+MIN_AREA_FACTORS = (0.78, 0.9)
+"""Minimum visible area of an object in a bin: as a multiple of the area of its outline from above, and, of a
+prism with a flat top, as a multiple of the visible area at the centre of the bin."""
+MAX_AREA_FACTORS = (1.55, 1.2)
+"""Maximum visible area, as a multiple of the circle around an object, and of the visible area of a prism.
 
-A camera beside the bin sees a side of the object, too. In 310 views of whole bins in the cells depth, wrist,
-overhead_large and fasteners, the contents covered 0.82 to 2.2 times the outlines of the items, and 0.4 to
-1.46 times their circles.
+In 310 views of whole bins in the cells depth, wrist, overhead_large and fasteners, the contents covered 0.82
+to 2.2 times the outlines of the items, cubes at least 1.53 times, and 0.4 to 1.46 times their circles.
 """
 MIN_LOOKS_AT_ITEM_LEFT_BEHIND = 2
 """Minimum number of looks that prove an item at a place from which another item was picked."""
@@ -218,11 +218,11 @@ class BinContents:
             self.surplus_counts[key] = max(self.surplus_counts[key], count - self.count_placed(*key))
         self.known_bins.update(name for name in self.bins if self.is_floor_visible(name, detections))
 
-    def compare_contents(self, appearances: Mapping[str, BinAppearance]) -> dict[str, str]:
+    def compare_contents(self, appearances: Mapping[str, BinAppearance], frame: Frame) -> dict[str, str]:
         """Return sentences on bins in which two images show more or less than the robot brought.
 
-        The sentences are by name of the bin, `appearances` as in `Camera.inspect_bins`. While the position of
-        an item is unknown, it may be in any bin.
+        The sentences are by name of the bin, `appearances` are those of `Camera.inspect_bins(frame)`. While
+        the position of an item is unknown, it may be in any bin.
         """
         changes: dict[str, str] = {}
         if self.records.filter_by_state(State.DROPPED):
@@ -237,7 +237,10 @@ class BinContents:
             items = {record.item: self.classes[record.label] for record in records}
             view = self.views.setdefault(name, BinView())
             new_view = BinView(items, area)
-            verb = self.find_change(name, view, new_view, is_whole=is_whole)
+            # Tangent of the angle between the line of sight and the vertical.
+            offset = frame.X_WC.position - self.bins[name].position
+            slant = math.hypot(offset[0], offset[1]) / max(offset[2], 1e-3)
+            verb = self.find_change(name, view, new_view, slant, is_whole=is_whole)
             if is_whole and not items and area < self.min_change:
                 self.known_bins.add(name)
             change = f"something {verb} {name}, and the robot did not do it" if verb else ""
@@ -248,8 +251,8 @@ class BinContents:
                 view.suspect = new_view
                 view.change = change
             # An object that the robot brought may hide the difference between the suspect view and its base.
-            is_ambiguous = view.suspect and not self.find_change(name, view.suspect, new_view, is_whole=True)
-            if is_whole and (name in changes or not (change or is_ambiguous)):
+            is_refuted = view.suspect and self.find_change(name, view.suspect, new_view, slant, is_whole=True)
+            if is_whole and (name in changes or (not change and (is_refuted or not view.suspect))):
                 self.views[name] = new_view
         return changes
 
@@ -258,23 +261,22 @@ class BinContents:
         """Least change of the visible area that an image proves, if the robot brought nothing [m²]."""
         return MIN_CHANGED_FRACTION * math.pi * min(each.radius for each in self.classes.values()) ** 2
 
-    def find_change(self, bin_name: str, old: BinView, new: BinView, *, is_whole: bool) -> str:
+    def find_change(self, bin_name: str, old: BinView, new: BinView, slant: float, *, is_whole: bool) -> str:
         """Return what happened to something between two views that no item explains; "" for nothing.
 
         If the new view is not whole, it may show less than lies in the bin.
         """
-        added = [new.items[item] for item in new.items.keys() - old.items.keys()]
-        removed = [old.items[item] for item in old.items.keys() - new.items.keys()]
+        added = [predict_area(new.items[item], slant) for item in new.items.keys() - old.items.keys()]
+        removed = [predict_area(old.items[item], slant) for item in old.items.keys() - new.items.keys()]
         # An item on others hides them.
         free_count = max(0, len(self.bins[bin_name].slots) - len(old.items))
-        lows = sorted(MIN_AREA_FACTOR * each.outline_area for each in added)[:free_count]
-        low = sum(lows) - sum(MAX_AREA_FACTOR * math.pi * each.radius**2 for each in removed)
-        high = sum(MAX_AREA_FACTOR * math.pi * each.radius**2 for each in added)
-        high -= sum(MIN_AREA_FACTOR * each.outline_area for each in removed)
+        lows = sorted(low for low, _ in added)[:free_count]
+        min_growth = sum(lows) - sum(high for _, high in removed) - (0.0 if lows else self.min_change)
+        max_growth = sum(high for _, high in added) - sum(low for low, _ in removed)
         growth = new.area - old.area
-        if growth > high + (0.0 if added else self.min_change):
+        if growth > max_growth + (0.0 if added else self.min_change):
             return "came into"
-        return "left" if is_whole and growth < low - (0.0 if lows else self.min_change) else ""
+        return "left" if is_whole and growth < min_growth else ""
 
     def discard_items_left_behind(self) -> dict[str, str]:
         """Discard placed items that looks show where they were picked, and return a sentence on each."""
@@ -374,6 +376,23 @@ class BinContents:
                 missing = Presence.UNSURE if is_unsure else Presence.GONE
                 presences[item] = Presence.PRESENT if rank >= missing_count else missing
         return presences
+
+
+def predict_area(object_class: ObjectClass, slant: float) -> tuple[float, float]:
+    """Return the least and the greatest area [m²] of a bin's floor that an object in the bin hides.
+
+    `slant` is the tangent of the angle between the line of sight and the vertical: a camera beside the bin
+    sees a side of the object, too.
+    """
+    circle_area = math.pi * object_class.radius**2
+    low = MIN_AREA_FACTORS[0] * object_class.outline_area
+    side_height = object_class.height * slant
+    prism_area = object_class.outline_area + side_height * 2 * object_class.radius
+    high = min(MAX_AREA_FACTORS[0] * circle_area, MAX_AREA_FACTORS[1] * prism_area)
+    if object_class.flat_top and object_class.footprint is not None:
+        side_area = side_height * min(object_class.footprint)
+        low = MIN_AREA_FACTORS[1] * (object_class.outline_area + side_area)
+    return low, high
 
 
 def find_probable_bin(record: ItemRecord) -> str | None:

@@ -262,7 +262,7 @@ class Tracker:
         self.emit(BinsEmptied(list(bins)))
 
     def observe_bins(self, appearances: Mapping[str, BinAppearance], frame: Frame) -> None:
-        for name, text in self._bin_contents.compare_contents(appearances).items():
+        for name, text in self._bin_contents.compare_contents(appearances, frame).items():
             self.unexplained.report(f"contents {name}", text, frame=frame.id)
         for name, appearance in appearances.items():
             if appearance.contradiction is not None:
