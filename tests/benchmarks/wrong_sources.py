@@ -99,7 +99,7 @@ def hide(
         result = access.proceed()
         if access.path == "detector.request":
             views[access.name] = access.arguments[0], station.driver.list_objects()
-        elif access.path == "request.result":
+        elif access.path == "request.result" and access.name in views:
             for name in ("confident", "doubtful", "unknown"):
                 seen = [each for each in getattr(result, name) if not is_hidden(each, *views[access.name])]
                 result = replace(result, **{name: tuple(seen)})
