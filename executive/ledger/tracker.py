@@ -271,8 +271,10 @@ class Tracker:
 
     def set_final_states(self, *, completed: bool) -> None:
         used_bins = {record.bin for record in self._records.filter_by_state(State.PLACED)}
-        if unseen_bins := sorted(used_bins - self._bin_contents.views.keys() - {""}):
-            self.assumption_reasons.append(f"no image showed what is in {', '.join(unseen_bins)}")
+        shown_bins = {name for name, view in self._bin_contents.views.items() if view.items}
+        if unseen_bins := sorted(used_bins - shown_bins - {""}):
+            text = f"no image showed the whole of {', '.join(unseen_bins)} after a placement"
+            self.assumption_reasons.append(text)
         for name, view in self._bin_contents.views.items():
             if view.change:
                 self.unexplained.report(f"contents {name}", view.change)

@@ -170,6 +170,17 @@ def test_what_the_robot_brings_does_not_hide_what_an_image_showed_before(boxes: 
     assert event.text == "something came into red_bin, and the robot did not do it"
 
 
+@pytest.mark.parametrize("is_whole", [True, False])
+def test_a_bin_that_no_image_showed_whole_after_a_placement_is_an_assumption(
+    boxes: Bench, is_whole: bool
+) -> None:
+    boxes.look(CUBE, view="full")
+    boxes.place("cube-1")
+    boxes.ledger.observe_bins({"red_bin": BinAppearance(None, 0.004, is_whole=is_whole)}, take_frame())
+    boxes.end()
+    assert any("red_bin" in reason for reason in boxes.ledger.assumption_reasons) is not is_whole
+
+
 @pytest.mark.parametrize("between", [[], [()]], ids=["seen at once", "appeared later"])
 def test_an_item_that_looks_show_where_it_was_picked_is_not_in_the_bin(bench: Bench, between: list) -> None:
     bench.look(CUBE, view="full")
