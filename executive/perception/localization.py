@@ -15,6 +15,8 @@ from executive.geometry import Array
 from executive.perception import evidence
 from executive.perception.camera_model import compute_pixel_ray, intersect_plane, measure_top_height
 
+OUTLINE_DISTANCE = 0.1
+"""Minimum distance from bins at which the outline of an object is compared with its class [m]."""
 RayTest = Callable[[Array, Array], Array | None]
 """Function of origin `(3,)` [m] and direction `(3,)` of a ray; returns the first hit `(3,)` [m], or None."""
 
@@ -99,8 +101,9 @@ class CellLocalizer:
         contradiction = contradiction or evidence.describe_top_contradiction(
             detection, position, frame, object_class
         )
-        # The outline of a class with a round or uneven top is no prism.
-        if contradiction or not (object_class.footprint and object_class.flat_top):
+        # The outline of a class with an uneven top is no prism, and a bin is unlike the table, too.
+        is_near_bin = any(bin.contains(position, OUTLINE_DISTANCE) for bin in self.bins)
+        if contradiction or is_near_bin or not (object_class.footprint and object_class.flat_top):
             return contradiction
         return evidence.describe_outline_contradiction(detections, detection, position, object_class)
 
