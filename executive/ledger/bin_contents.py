@@ -33,7 +33,7 @@ MIN_CHANGED_FRACTION = 0.5
 MIN_AREA_FACTORS = (0.5, 0.9)
 """Minimum visible area of an object in a bin: as a multiple of the area of its outline from above, and, of a
 prism with a flat top, as a multiple of the visible area at the centre of the bin."""
-MAX_AREA_FACTORS = (1.55, 1.2)
+MAX_AREA_FACTORS = (1.55, 1.4)
 """Maximum visible area, as a multiple of the circle around an object, and of the visible area of a prism.
 
 In 700 views of whole bins in the cells depth, wrist, overhead_large and fasteners, the contents covered 0.6
