@@ -26,7 +26,7 @@ from executive.ledger.foreign import ForeignObjects
 from executive.ledger.item import ON_TABLE, ItemRecord, ItemRecords, State
 from executive.ledger.load_cell import LoadCell
 from executive.ledger.look import AMBIGUITY_FACTOR, LookUpdate, make_look_event
-from executive.ledger.unexplained import Unexplained
+from executive.ledger.unexplained import SETTLING_LOOK_COUNT, Unexplained
 
 MIN_FAILED_PICKS_OF_BROKEN_TOOL = 8
 """Number of failed picks, more than the attempts for one item, after which one must have succeeded."""
@@ -111,6 +111,10 @@ class Tracker:
         change_count = look.frame.change_count
         unmoved = [each for each in regions if self._coverage.is_unchanged(each.position, change_count)]
         self.unexplained.observe(look, unmoved, self.config.gate * AMBIGUITY_FACTOR)
+        for record in self._records.filter_by_state(State.SEEN):
+            # Detector and witness agree.
+            if record.belief.look_count >= SETTLING_LOOK_COUNT:
+                record.belief.is_confirmed |= self.unexplained.explain(record.position, self.config.gate)
 
     def choose_place_to_probe(self) -> Array | None:
         return self.unexplained.choose_place_to_probe()
@@ -273,8 +277,7 @@ class Tracker:
         used_bins = {record.bin for record in self._records.filter_by_state(State.PLACED)}
         shown_bins = {name for name, view in self._bin_contents.views.items() if view.items}
         if unseen_bins := sorted(used_bins - shown_bins - {""}):
-            text = f"no image showed the whole of {', '.join(unseen_bins)} after a placement"
-            self.assumption_reasons.append(text)
+            self.assumption_reasons.append(f"no image showed all that lies in {', '.join(unseen_bins)}")
         for name, view in self._bin_contents.views.items():
             if view.change:
                 self.unexplained.report(f"contents {name}", view.change)

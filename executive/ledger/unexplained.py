@@ -144,6 +144,19 @@ class Unexplained:
         self._entries[key] = Entry(UnexplainedChanged(f"unexplained-{self._count}", "", []))
         return self._entries[key]
 
+    def explain(self, position: Array, max_distance: float) -> bool:
+        """Close the settled regions within `max_distance` [m] of an item; return True if there was one."""
+        keys = [
+            key
+            for key, entry in self._entries.items()
+            if entry.position is not None
+            and entry.look_count >= SETTLING_LOOK_COUNT
+            and math.dist(entry.position[:2], position[:2]) <= max_distance
+        ]
+        for key in keys:
+            self._close(key)
+        return bool(keys)
+
     def _close(self, key: str) -> None:
         """Close the entry with a key, if there is one."""
         entry = self._entries.pop(key, None)

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from ledger_bench import EYE, Bench
 
+from executive.cell.frame import Region
 from executive.cell.objects import ObjectClass
 from executive.events import FrameSearched, ItemChanged
 from executive.ledger.certainty import MIN_UNCERTAIN_LOOKS_TO_REJECT, Certainty
+from executive.ledger.unexplained import SETTLING_LOOK_COUNT
 
 THERE = ("cube", 0.5, 0.0)
 UNSURE = ("rejected", "it has no confident detection")
@@ -182,3 +185,11 @@ def test_an_item_where_none_is_expected_is_touched_after_many_looks_from_one_vie
     for _ in range(looks):
         bench.look(("cube", 0.7, 0.33), view="full", by=replace(EYE, repeated=0.9))
     assert bench.ledger.is_certain("cube-1") is is_certain
+
+
+def test_an_item_that_the_witness_shows_too_exists(bench: Bench) -> None:
+    place = np.array([0.7, 0.33, 0.025])
+    for looks in range(1, 5):
+        bench.look(("cube", 0.7, 0.33), by=replace(EYE, repeated=0.97))
+        bench.ledger.observe_regions(bench.last_look[0], [Region((0, 0, 9, 9), place, "something")])
+        assert bench.ledger.is_certain("cube-1") is (looks >= SETTLING_LOOK_COUNT)
