@@ -31,8 +31,9 @@ ATTEMPTS_BEFORE_PROBE = 3
 """Number of failed attempts after which each approach is a probe."""
 GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
 """Angle between two successive points of a Vogel spiral [rad]."""
-
-
+UNEVEN_TOP_TOLERANCE = 0.003
+"""Maximum difference between the height of a touch and the height of a class without a flat top [m], unless
+`touch_tolerance` is greater: a duck that leans on a cube is 2 mm lower."""
 OTHER_CLASS_TOLERANCE = 0.0025
 """Maximum difference between the height of a touch and the height of another class to which the object may
 belong [m]."""
@@ -121,7 +122,10 @@ class Suction(ToolModel):
         `overtravel` below its top. It may have hit the object beside its top if it is too low for the assumed
         class, no class has this height, and the top is not flat.
         """
-        if min(abs(height - top) for top in object_class.top_heights) <= self.touch_tolerance:
+        tolerance = self.touch_tolerance
+        if not object_class.flat_top:
+            tolerance = max(tolerance, UNEVEN_TOP_TOLERANCE)
+        if min(abs(height - top) for top in object_class.top_heights) <= tolerance:
             return ToolMeasurement()
         contradiction = (
             f"it was touched {height * 1000:.0f} mm above the table, and a {object_class.label} is "
