@@ -7,7 +7,7 @@ An object may stand on the table or, in a cell with stacks, on one object of any
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import cv2
@@ -155,7 +155,7 @@ def describe_size_contradiction(
         return _describe_footprint_contradiction(detection, position, frame, object_class)
     left, top, right, bottom = detection.box
     half_height = object_class.height / 2
-    cylinder = _project_outlines(frame, position, object_class, [-half_height, half_height])[0]
+    cylinder = next(_project_outlines(frame, position, object_class, [-half_height, half_height]))
     projected_length = float(np.ptp(cylinder, axis=(0, 1)).max())
     scale = float(frame.matrix[0, 0]) / frame.compute_depth(position)
     min_length = math.sqrt(2) * object_class.radius * scale * (1 - SIZE_TOLERANCE) - SIZE_TOLERANCE_PX
@@ -179,18 +179,18 @@ def _describe_footprint_contradiction(
     of an object that stands on another one may contain the other one, if both have the same colour.
     """
     half_height = object_class.height / 2
-    pixels = _project_outlines(frame, position, object_class, [-half_height, 0.0, half_height])
-    outline_sides = np.ptp(pixels[:, 1], axis=1)
-    corners = pixels.reshape(len(pixels), -1, 2)
-    if position[2] - half_height > TOP_TOLERANCE:
-        base = _project_outlines(frame, position, replace(object_class, footprint=None), [-position[2]])
-        corners = np.concatenate([corners, base[:, 0]], axis=1)
-    prism_sides = np.ptp(corners, axis=1)
     sides = np.subtract(detection.box[2:], detection.box[:2])
-    is_long_enough = sides + SIDE_TOLERANCE_PX >= MIN_SIDE_FRACTION * outline_sides
-    is_short_enough = sides - SIDE_TOLERANCE_PX <= MAX_SIDE_FACTOR * prism_sides
-    if np.any(np.all(is_long_enough & is_short_enough, axis=1)):
-        return ""
+    base = np.empty((0, 2))
+    if position[2] - half_height > TOP_TOLERANCE:
+        disc = replace(object_class, footprint=None)
+        base = next(_project_outlines(frame, position, disc, [-position[2]]))[0]
+    for outlines in _project_outlines(frame, position, object_class, [-half_height, 0.0, half_height]):
+        outline_sides = np.ptp(outlines[1], axis=0)
+        prism_sides = np.ptp(np.concatenate([*outlines, base]), axis=0)
+        is_long_enough = sides + SIDE_TOLERANCE_PX >= MIN_SIDE_FRACTION * outline_sides
+        is_short_enough = sides - SIDE_TOLERANCE_PX <= MAX_SIDE_FACTOR * prism_sides
+        if np.all(is_long_enough & is_short_enough):
+            return ""
     size = _format_size(sides * frame.compute_depth(position) / float(frame.matrix[0, 0]))
     expectation = f"a {detection.label}, {_format_size(np.array(object_class.footprint))} from above"
     return f"its box is {size}, and {expectation}, fits it at no yaw"
@@ -198,8 +198,8 @@ def _describe_footprint_contradiction(
 
 def _project_outlines(
     frame: Frame, position: Array, object_class: ObjectClass, heights: Sequence[float]
-) -> Array:
-    """Return the pixels `(36, N, 16, 2)` of the outline of a class at `FOOTPRINT_YAWS` and some heights.
+) -> Iterator[Array]:
+    """Yield the pixels `(N, 16, 2)` of the outline of a class at some heights, for each of `FOOTPRINT_YAWS`.
 
     The outline is the part of the footprint within the radius. The N `heights` [m] are relative to the centre
     of the object, `position` `(3,)` [m].
@@ -209,9 +209,9 @@ def _project_outlines(
     if object_class.footprint is not None:
         half_size = np.array(object_class.footprint) / 2
         outline[:, :2] = np.clip(outline[:, :2], -half_size, half_size)
-    levels = np.array([(0.0, 0.0, height) for height in heights])[:, None]
-    points = position + levels + (outline @ FOOTPRINT_ROTATIONS)[:, None]
-    return project(frame.matrix, frame.X_WC, points.reshape(-1, 3)).reshape(*points.shape[:3], 2)
+    levels = position + [[(0.0, 0.0, height)] for height in heights]
+    for rotation in FOOTPRINT_ROTATIONS:
+        yield project(frame.matrix, frame.X_WC, levels + outline @ rotation)
 
 
 def describe_outline_contradiction(
@@ -233,13 +233,12 @@ def describe_outline_contradiction(
     frame = look.frame
     outline, is_free, corner = _find_outline(look, detection)
     half_height = object_class.height / 2
-    prisms = _project_outlines(frame, position, object_class, [-half_height, half_height])
-    prism_pixels = (prisms.reshape(len(prisms), -1, 2) - corner).round().astype(np.int32)
     outline_area = cv2.countNonZero(outline)
     best_overlap = 0.0
-    for pixels in prism_pixels:
+    for outlines in _project_outlines(frame, position, object_class, [-half_height, half_height]):
+        prism = (np.concatenate(outlines) - corner).round().astype(np.int32)
         expected = np.zeros_like(outline)
-        cv2.fillConvexPoly(expected, cv2.convexHull(pixels), 1)
+        cv2.fillConvexPoly(expected, cv2.convexHull(prism), 1)
         whole_area = cv2.countNonZero(expected)
         expected &= is_free
         expected_area = cv2.countNonZero(expected)
