@@ -122,9 +122,7 @@ class Suction(ToolModel):
         `overtravel` below its top. It may have hit the object beside its top if it is too low for the assumed
         class, no class has this height, and the top is not flat.
         """
-        tolerance = self.touch_tolerance
-        if not object_class.flat_top:
-            tolerance = max(tolerance, UNEVEN_TOP_TOLERANCE)
+        tolerance = self._get_tolerance(object_class)
         if min(abs(height - top) for top in object_class.top_heights) <= tolerance:
             return ToolMeasurement()
         contradiction = (
@@ -140,10 +138,16 @@ class Suction(ToolModel):
         return ToolMeasurement(contradiction, may_be_wrong, is_miss=not is_near_top)
 
     def find_distinct_labels(self, classes: Mapping[str, ObjectClass]) -> frozenset[str]:
-        """Return the classes whose height differs by more than `touch_tolerance` from all others."""
+        """Return the classes with which a touch at the height of any other class does not agree."""
         heights = np.array([object_class.height for object_class in classes.values()])
-        counts = (np.abs(heights[:, None] - heights) <= self.touch_tolerance).sum(axis=1)
+        tolerances = np.array([self._get_tolerance(object_class) for object_class in classes.values()])
+        counts = (np.abs(heights[:, None] - heights) <= tolerances[:, None]).sum(axis=1)
         return frozenset(label for label, count in zip(classes, counts, strict=True) if count == 1)
+
+    def _get_tolerance(self, object_class: ObjectClass) -> float:
+        """Return the maximum difference between a touch that agrees with a class and its height [m]."""
+        tolerance = self.touch_tolerance
+        return tolerance if object_class.flat_top else max(tolerance, UNEVEN_TOP_TOLERANCE)
 
     def build_sim(self, world: World, noise_seed: int = 0) -> SimTool:
         """Return the simulated tool, whose cup seals on a surface without steps, edges and strong tilt."""

@@ -130,3 +130,17 @@ def test_an_approach_never_feels_below_the_middle_of_what_it_is_to_touch() -> No
 )
 def test_a_touch_that_is_too_low_for_all_classes_may_have_missed_the_top(label, height, is_possible):
     assert measure(label, height).may_be_wrong is is_possible
+
+
+@pytest.mark.parametrize(
+    ("is_flat", "height", "distinct"),
+    [(True, 0.048, {"cube", "can"}), (False, 0.048, {"can"}), (False, 0.046, {"cube", "can"})],
+)
+def test_a_touch_tells_no_class_from_another_whose_height_agrees_with_it(is_flat, height, distinct):
+    tool = TOOL.model_copy(update={"touch_tolerance": 0.001})
+    can = ObjectClass("can", height, 0.03, flat_top=True)
+    cube = ObjectClass("cube", 0.05, 0.0354, flat_top=is_flat)
+    classes = {"cube": cube, "can": can}
+    found = tool.measure_contact(cube, np.array([0.5, 0.0, 0.025]), height, classes, overtravel=0.03)
+    assert tool.find_distinct_labels(classes) == distinct
+    assert ("cube" in distinct) is bool(found.contradiction)
