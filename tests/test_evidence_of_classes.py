@@ -75,11 +75,18 @@ def test_the_box_of_a_cube_on_another_one_may_contain_both():
     ("sides", "shown_fraction", "contrast", "fits"),
     [
         ((0.05, 0.05), 1.0, 100, True),
+        ((0.065, 0.05), 1.0, 100, False),
         ((0.07, 0.035), 1.0, 100, False),
         ((0.09, 0.05), 0.7, 100, False),
         ((0.07, 0.035), 1.0, 5, True),
     ],
-    ids=["cube", "brick with the box of a cube", "box of a part of a brick", "without contrast"],
+    ids=[
+        "cube",
+        "slightly longer brick",
+        "brick with the box of a cube",
+        "box of a part of a brick",
+        "without contrast",
+    ],
 )
 def test_the_pixels_of_an_object_have_to_fill_the_outline_of_its_class(sides, shown_fraction, contrast, fits):
     place = np.array([0.5, 0.0, 0.025])

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -60,11 +61,15 @@ MIN_OUTLINE_CONTRAST = 20.0
 """Minimum deviation of a pixel of an object from the table around it [grey level]."""
 MIN_OUTLINE_STDS = 4.0
 """Minimum deviation of a pixel of an object from the table around it, in standard deviations of the table."""
-MIN_OVERLAP = 0.75
+MIN_SHOWN_PART = 0.7
+"""Minimum area of an outline that is compared, as a fraction of that of the class, and of the visible part of
+the class, as a fraction of the whole."""
+MIN_OVERLAP = 0.85
 """Minimum common part of the outlines of an object and its class, as a fraction of their union.
 
-In 40 declared runs of five missions, one of 684 detections of cubes had less, beside the moving arm. Bricks
-of 80 x 50, 90 x 50 and 70 x 35 mm had 0.58 to 0.70.
+In declared runs of sort_overhead, sort_wrist and sort_large, 360 of 362 detections of cubes had at least
+0.92, the others were beside the moving arm. Bricks of 65 x 50 mm had 0.77 to 0.82, and of 58 x 50 mm 0.86 to
+0.90.
 """
 MIN_BORDER_DISTANCE = 2.0
 """Minimum distance of a completely visible box from the border of the searched region [pixel]."""
@@ -231,18 +236,23 @@ def describe_outline_contradiction(
     if position[2] - object_class.height / 2 > TOP_TOLERANCE:
         return ""
     frame = look.frame
-    outline, is_free, corner = _find_outline(look, detection)
+    outline, is_free = _find_outline(look, detection)
     half_height = object_class.height / 2
     outline_area = cv2.countNonZero(outline)
+    if not outline_area:
+        return ""
+    centroid = _compute_centroid(outline)
     best_overlap = 0.0
     for outlines in _project_outlines(frame, position, object_class, [-half_height, half_height]):
-        prism = (np.concatenate(outlines) - corner).round().astype(np.int32)
+        prism = cv2.convexHull(np.concatenate(outlines).astype(np.float32))
+        # The box of the detector may be a pixel off.
+        shifted = prism + centroid - _compute_centroid(prism)
         expected = np.zeros_like(outline)
-        cv2.fillConvexPoly(expected, cv2.convexHull(prism), 1)
+        cv2.fillConvexPoly(expected, shifted.round().astype(np.int32), 1)
         whole_area = cv2.countNonZero(expected)
         expected &= is_free
         expected_area = cv2.countNonZero(expected)
-        if outline_area < MIN_OVERLAP * expected_area or expected_area < MIN_OVERLAP * whole_area:
+        if outline_area < MIN_SHOWN_PART * expected_area or expected_area < MIN_SHOWN_PART * whole_area:
             return ""
         overlap = cv2.countNonZero(expected & outline) / cv2.countNonZero(expected | outline)
         if overlap >= MIN_OVERLAP:
@@ -251,10 +261,8 @@ def describe_outline_contradiction(
     return f"its outline and that of a {detection.label} have {best_overlap:.0%} of their area in common"
 
 
-def _find_outline(
-    look: Detections, detection: Detection
-) -> tuple[NDArray[np.uint8], NDArray[np.uint8], NDArray[np.int_]]:
-    """Return a mask of an object, a mask of the pixels outside of other boxes, and their left upper corner.
+def _find_outline(look: Detections, detection: Detection) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """Return a mask of an object, and a mask of the pixels outside of other boxes.
 
     The first mask is the convex hull of the connected pixels at the centre of the box that differ from the
     table around it. Both masks cover the box and its surroundings, with a width of half its longer side.
@@ -276,7 +284,7 @@ def _find_outline(
     is_table[inner_box[0, 1] : inner_box[1, 1], inner_box[0, 0] : inner_box[1, 0]] = False
     outline = np.zeros_like(is_free)
     if not is_table.any():
-        return outline, is_free, corner
+        return outline, is_free
     deviations = np.abs(image - np.median(image[is_table], axis=0)).max(axis=2)
     noise = 1.4826 * float(np.median(deviations[is_table]))
     mask = (deviations > max(MIN_OUTLINE_CONTRAST, MIN_OUTLINE_STDS * noise)).astype(np.uint8) & is_free
@@ -285,7 +293,13 @@ def _find_outline(
     if labels[row, column]:
         points = cv2.findNonZero((labels == labels[row, column]).astype(np.uint8))
         cv2.fillConvexPoly(outline, cv2.convexHull(points), 1)
-    return outline & is_free, is_free, corner
+    return outline & is_free, is_free
+
+
+def _compute_centroid(shape: NDArray[Any]) -> Array:
+    """Return the centroid `(2,)` [pixel] of a mask `(H, W)` or a polygon `(N, 1, 2)`."""
+    moments = cv2.moments(shape)
+    return np.array([moments["m10"], moments["m01"]]) / moments["m00"]
 
 
 def _format_size(sides: Array) -> str:
