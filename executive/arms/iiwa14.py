@@ -20,7 +20,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import ArrayLike
 
-from executive.cell.arm_config import ArmFile
+from executive.cell.arm_config import ArmConfig
 from executive.errors import InputError, Unreachable
 from executive.geometry import Array, Pose, format_point
 from executive.motion.joints import BranchKey, JointLimits, JointRange, wrap_angles
@@ -77,7 +77,7 @@ class Iiwa14:
     distance between links 5 and 7, which limits joint 6.
     """
 
-    def __init__(self, arm: ArmFile, tool_length: float, min_link_distance: float | None = None) -> None:
+    def __init__(self, arm: ArmConfig, tool_length: float, min_link_distance: float | None = None) -> None:
         if arm.joint_count != JOINT_COUNT:
             raise InputError(
                 f"the solver of the arm {arm.arm} needs {JOINT_COUNT} joints, not {arm.joint_count}"
@@ -90,6 +90,9 @@ class Iiwa14:
             lower[5] = max(lower[5], -max_angle)
             upper[5] = min(upper[5], max_angle)
         self.joint_range = JointRange(lower, upper)
+        self._base_position = np.array(arm.base.position)
+        # The base turns about the axis of joint 1.
+        self._base_yaw = math.radians(arm.base.yaw_deg)
         self._wrist_to_tool = WRIST_TO_LINK_7 + arm.flange.offset + tool_length
         cos4 = math.cos(max(-lower[3], upper[3]))
         # Law of cosines in the triangle of shoulder, elbow and wrist.
@@ -100,17 +103,14 @@ class Iiwa14:
         """Return the tool pose."""
         return self._compute_frames(q)[-1]
 
-    def compute_joint_frames(self, q: ArrayLike) -> tuple[Pose, ...]:
-        """Return the frames of the protocol; z of each frame points along the next link."""
-        return tuple(self._compute_frames(q)[:-1])
-
     def compute_tcps_and_axes(self, qs: Array) -> tuple[Array, Array]:
         """Return tool centre points and tool axes.
 
         Both vectors are transformed joint by joint from the wrist to the base, which takes a fifth of the
         time of complete frames. Joint 7 has no effect, because its axis is the tool axis.
         """
-        angles = np.ascontiguousarray(qs.T[:6])  # Operations on contiguous rows are faster.
+        angles = qs.T[:6].copy(order="C")  # Operations on contiguous rows are faster.
+        angles[0] += self._base_yaw
         cosines = np.cos(angles)
         sines = np.sin(angles)
         vectors = np.empty((3, 2, len(qs)))
@@ -126,12 +126,13 @@ class Iiwa14:
         for joint in (2, 1, 0):
             _rotate(vectors, cosines[joint], sines[joint], joint)
         tcp[2] += SHOULDER_HEIGHT
+        tcp += self._base_position[:, None]
         return tcp.T, axis.T
 
     def find_branch(self, q: ArrayLike) -> BranchKey:
         """Return the index of the flip, and the redundancy angle [rad]; 0: elbow up."""
         is_flipped = np.asarray(q, dtype=float)[[1, 3, 5]] < 0  # shoulder, elbow, wrist
-        frames = self.compute_joint_frames(q)
+        frames = self._compute_frames(q)
         shoulder, elbow, wrist = (frames[i].position for i in (1, 3, 5))
         _, up, side = _compute_elbow_frame(wrist - shoulder)
         angle = math.atan2(float((elbow - shoulder) @ side), float((elbow - shoulder) @ up))
@@ -143,13 +144,13 @@ class Iiwa14:
         return self._solve_angles(poses, np.array([angle]))[:, int(flip), 0]
 
     def solve_all(
-        self, X_WT: Pose, q_seed: ArrayLike, angle_step: float
+        self, poses: Sequence[Pose], q_seed: ArrayLike, angle_step: float
     ) -> tuple[Array, Sequence[BranchKey]]:
         """Return the solutions for all flips and evenly spaced redundancy angles, that of `q_seed` first."""
         offsets = np.radians(np.arange(0.0, 360.0, math.degrees(angle_step)))
         angles = self.find_branch(q_seed)[1] + offsets
-        solutions = self._solve_angles([X_WT], angles).reshape(-1, JOINT_COUNT)
-        return solutions, list(product(range(len(FLIPS)), angles.tolist()))
+        solutions = [self._solve_angles([pose], angles).reshape(-1, JOINT_COUNT) for pose in poses]
+        return np.array(solutions), list(product(range(len(FLIPS)), angles.tolist()))
 
     def _solve_angles(self, poses: Sequence[Pose], angles: Array) -> Array:
         """Return the solutions `(N, 8, S, 7)` [rad] of `N` tool poses, by flip and redundancy angle.
@@ -176,6 +177,7 @@ class Iiwa14:
 
         unflipped_qs = np.empty((len(poses), 1, len(angles), JOINT_COUNT))
         unflipped_qs[:, 0, :, :3] = _find_zyz_angles(x3, y3, z3)
+        unflipped_qs[:, 0, :, 0] -= self._base_yaw
         unflipped_qs[..., 3] = q4
         unflipped_qs[:, 0, :, 4:] = _find_zyz_angles(*np.moveaxis(R_47, -1, 0))
         return wrap_angles(unflipped_qs * _FLIP_SIGNS[:, None] + _FLIP_OFFSETS[:, None])
@@ -190,7 +192,7 @@ class Iiwa14:
             Unreachable: The wrist is too near to the shoulder or too far from the shoulder.
         """
         wrist = X_WT.position - self._wrist_to_tool * X_WT.rotation[:, 2]
-        shoulder_to_wrist = wrist - (0.0, 0.0, SHOULDER_HEIGHT)
+        shoulder_to_wrist = wrist - self._base_position - (0.0, 0.0, SHOULDER_HEIGHT)
         distance = float(np.linalg.norm(shoulder_to_wrist))
         excess = distance - self._max_wrist_distance
         shortfall = self._min_wrist_distance - distance
@@ -209,12 +211,13 @@ class Iiwa14:
 
     def _compute_frames(self, q: ArrayLike) -> list[Pose]:
         """Return the frames of joints 1 to 7 at `q` `(7,)` [rad], followed by the frame of the tool."""
-        angles = np.asarray(q, dtype=float)[:, None, None]
+        angles = np.array(q, dtype=float)[:, None, None]
+        angles[0] += self._base_yaw
         # Rodrigues' formula.
         joint_rotations = _PARALLEL_PARTS + np.cos(angles) * _NORMAL_PARTS + np.sin(angles) * _CROSS_PRODUCTS
         frames = []
         R = np.eye(3)
-        p = np.array([0.0, 0.0, SHOULDER_HEIGHT])
+        p = self._base_position + np.array([0.0, 0.0, SHOULDER_HEIGHT])
         for joint, R_joint in enumerate(joint_rotations):
             if length := _LENGTHS.get(joint):
                 p = p + length * R[:, 2]

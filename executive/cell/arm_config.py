@@ -5,12 +5,11 @@ Each field is a key of `missions/arms/*.yaml`, in SI units. Values of keys that 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Annotated
 
-from pydantic import ConfigDict, Field, ValidationInfo, field_validator, model_validator
+from pydantic import ConfigDict, Field, ValidationInfo, WithJsonSchema, field_validator, model_validator
 
-from executive.cell.device_config import Angle, Distance, Length, Name, Section
+from executive.cell.device_config import Angle, Angles, Distance, Name, Section, Vector
 
 DEFAULT_ARM_FILE = "arms/iiwa14.yaml"
 """Shipped arm file of cells that name none: the cell files of earlier versions are for this arm."""
@@ -24,6 +23,10 @@ Acceleration = Annotated[float, Field(ge=0.1, le=1000)]
 """Joint acceleration [rad/s²]; at 0.1 rad/s², a motion takes minutes; the fastest arms reach 100 rad/s²."""
 Jerk = Annotated[float, Field(ge=1, le=1e5)]
 """Joint jerk [rad/s³]; the minimum reaches 0.1 rad/s² in 0.1 s, the maximum 1000 rad/s² in 0.01 s."""
+PerJoint = WithJsonSchema(
+    {"anyOf": [{"type": "number"}, {"type": "array", "items": {"type": "number"}, "minItems": 1}]}
+)
+"""JSON schema of values for all joints: the loader of arm files also accepts one number for all joints."""
 Torque = Annotated[float, Field(ge=0.1, le=1e5)]
 """Joint torque [Nm], from the torque of a servo for models to that of the arms that lift cars."""
 LinkName = Annotated[str, Field(min_length=1, max_length=200)]
@@ -31,23 +34,23 @@ LinkName = Annotated[str, Field(min_length=1, max_length=200)]
 
 
 class LimitsConfig(Section):
-    """Joint limits of the arm, one value for each joint, and their source."""
+    """Joint limits of the arm and their source; each key has one value for each joint, or one for all."""
 
     source: str
     """Source of the limits, for instance a data sheet."""
-    min_position_deg: tuple[Angle, ...] = ()
+    min_position_deg: Annotated[tuple[Angle, ...], PerJoint] = ()
     """Minimum joint positions [degree]; if empty, the negatives of `position_deg`."""
-    position_deg: tuple[Angle, ...] = Field(min_length=1)
-    """Maximum joint positions [degree]."""
-    velocity_deg: tuple[Speed, ...]
-    """Maximum joint velocities [degree/s]."""
-    acceleration: tuple[Acceleration, ...]
+    position_deg: Annotated[tuple[Angle, ...], PerJoint] = Field(min_length=1)
+    """Maximum joint positions [degree]; if not given, both limits are those of the URDF."""
+    velocity_deg: Annotated[tuple[Speed, ...], PerJoint]
+    """Maximum joint velocities [degree/s]; if not given, those of the URDF."""
+    acceleration: Annotated[tuple[Acceleration, ...], PerJoint]
     """Maximum joint accelerations [rad/s²]."""
-    jerk: tuple[Jerk, ...]
+    jerk: Annotated[tuple[Jerk, ...], PerJoint]
     """Maximum joint jerks [rad/s³]."""
-    stop_acceleration: tuple[Acceleration, ...]
+    stop_acceleration: Annotated[tuple[Acceleration, ...], PerJoint]
     """Maximum joint accelerations while the arm brakes [rad/s²]."""
-    stop_jerk: tuple[Jerk, ...]
+    stop_jerk: Annotated[tuple[Jerk, ...], PerJoint]
     """Maximum joint jerks while the arm brakes [rad/s³]."""
 
     @property
@@ -73,30 +76,17 @@ class LimitsConfig(Section):
 
 
 class FlangeConfig(Section):
-    """The flange, on which the tool is mounted; its z axis points out of the arm."""
+    """The flange, on which the tool is mounted.
+
+    Its z axis is the axis of the last joint, and points out of the arm.
+    """
 
     link: LinkName
-    """Link of the URDF whose z axis is the z axis of the flange."""
+    """Link of the URDF at the flange."""
+    rotation_deg: Angles = (0.0, 0.0, 0.0)
+    """Rotation from the link to the flange: roll, pitch, yaw [degree]."""
     offset: Distance = 0.0
-    """Distance from the origin of the link to the flange along the z axis [m]."""
-
-
-class ArmSimulationConfig(Section):
-    """Properties of the simulated arm that its URDF does not contain."""
-
-    source: str
-    """Source of the values."""
-    first_collision_link: LinkName
-    """First link that can collide with other bodies; the links before it stay in their place."""
-    wrist_link: LinkName
-    """First link of the wrist, whose links a held object is permitted to touch."""
-    self_collision_pairs: tuple[tuple[LinkName, LinkName], ...] = ()
-    """Pairs of links that can collide with each other; `tool` is the tool."""
-    link_radius: Length
-    """Radius of a cylinder around the housing of each link [m]."""
-    sampling_pose_deg: tuple[Angle, ...]
-    """Joint positions, without joint 1, from which the numerical inverse kinematics of data sets starts
-    [degree]."""
+    """Distance from the origin of the link to the flange along the z axis of the flange [m]."""
 
 
 class ArmFile(Section):
@@ -105,18 +95,20 @@ class ArmFile(Section):
     arm: Name
     """Name of the arm."""
     urdf: str = Field(min_length=1)
-    """Path of the URDF, relative to this file or to pybullet_data. Each link from the base to the flange has
-    its own joint."""
+    """The URDF: a path relative to this file, `package:NAME/path` for a file in an installed Python package,
+    or a path relative to pybullet_data. Links beyond the flange, such as a gripper, are left out."""
     flange: FlangeConfig
     """Flange of the arm."""
     limits: LimitsConfig
     """Joint limits of the arm."""
-    effort: tuple[Torque, ...]
-    """Maximum joint torques [Nm]."""
-    solver: str
-    """Inverse kinematics of the arm: the name of an entry point of the group `executive.ik_solvers`."""
-    simulation: ArmSimulationConfig
-    """Properties of the simulated arm that its URDF does not contain."""
+    effort: Annotated[tuple[Torque, ...], PerJoint]
+    """Maximum joint torques [Nm]; if not given, those of the URDF."""
+    solver: str = "auto"
+    """Inverse kinematics of the arm: the name of an entry point of the group `executive.ik_solvers`; `auto`
+    is the analytic solver of EAIK if it is installed and knows the arm, otherwise the numeric solver."""
+    self_collision_pairs: tuple[tuple[LinkName, LinkName], ...] | None = None
+    """Pairs of links that can collide with each other; `tool` is the tool. If not given, the simulator finds
+    the pairs in random poses."""
 
     @property
     def joint_count(self) -> int:
@@ -126,23 +118,19 @@ class ArmFile(Section):
     @field_validator("effort")
     @classmethod
     def _check_effort(cls, effort: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
-        _check_count(effort, "values", info, 0)
+        limits: LimitsConfig | None = info.data.get("limits")  # None: the limits are invalid.
+        if limits and len(effort) != (count := len(limits.position_deg)):
+            raise ValueError(f"needs {count} values, not {len(effort)}, for the joints in limits")
         return effort
 
-    @field_validator("simulation")
-    @classmethod
-    def _check_sampling_pose(
-        cls, simulation: ArmSimulationConfig, info: ValidationInfo
-    ) -> ArmSimulationConfig:
-        _check_count(simulation.sampling_pose_deg, "angles in sampling_pose_deg", info, 1)
-        return simulation
 
+class BaseConfig(Section):
+    """Place of the base of the arm in the world, whose origin is on the table top."""
 
-def _check_count(values: Sequence[float], noun: str, info: ValidationInfo, omitted_count: int) -> None:
-    """Raise `ValueError` unless there is a value for each joint except the first `omitted_count`."""
-    limits: LimitsConfig | None = info.data.get("limits")  # None: the limits are invalid.
-    if limits and len(values) != (count := len(limits.position_deg) - omitted_count):
-        raise ValueError(f"needs {count} {noun}, not {len(values)}, for the joints in limits")
+    position: Vector = (0.0, 0.0, 0.0)
+    """Origin of the base link of the URDF: x, y, z [m]."""
+    yaw_deg: Angle = 0.0
+    """Rotation of the base about the vertical axis [degree]."""
 
 
 class ArmConfig(ArmFile):
@@ -160,6 +148,8 @@ class ArmConfig(ArmFile):
     file: str = Field(DEFAULT_ARM_FILE, exclude=True)
     """Path of an arm file, relative to the cell file or to the shipped missions, which supplies all missing
     keys except `poses_deg`. If no file is given, `limits` is required."""
+    base: BaseConfig = BaseConfig()
+    """Place of the base of the arm in the world."""
     poses_deg: dict[Name, tuple[Angle, ...]] = Field(min_length=1)
     """Named joint configurations, one position for each joint [degree]; a run starts in `home`."""
 

@@ -10,12 +10,14 @@ from pathlib import Path
 
 import numpy as np
 
+from executive.arms.urdf import PACKAGE_PREFIX
 from executive.cell.arm_config import DEFAULT_ARM_FILE, ArmFile
 from executive.cell.config import BinConfig, CellConfig, ObjectConfig
 from executive.cell.objects import BIN_THICKNESS
 from executive.errors import InputError
 from executive.geometry import Array
-from executive.text.files import find_file_below, has_outside_link, is_outside_path, read_source
+from executive.mission.arm_file import complete_arm
+from executive.text.files import describe_outside_path, find_file_below, read_source
 from executive.text.findings import Finding, MissionError, Source, Span, make_error, sort_findings
 from executive.text.validate import BASE_KEY, KeyPath, find_span, override_cell, validate
 from executive.text.yaml_files import YamlMapping, YamlNode, YamlScalar, flatten, parse_yaml
@@ -175,6 +177,11 @@ class _CellFileReader:
             return None
         arm_root, findings = parse_yaml(source)
         self.findings += findings
+        if isinstance(arm_root, YamlMapping):
+            arm_root, errors = complete_arm(arm_root, self.paths[source].parent)
+            self.findings += errors
+            if errors:
+                return None
         arm_file, errors = validate(arm_root, ArmFile) if arm_root else (None, [])
         self.findings += errors
         if arm_file is None or not isinstance(arm_root, YamlMapping):
@@ -317,13 +324,11 @@ def _resolve_model_files(
 
     def resolve(path: str, *key_path: str) -> str:
         folder = paths.get(file.find_span(key_path).source, paths[file.source]).parent
-        if is_outside_path(path):
-            message = f'"{path}" must be a relative path without ".."'
+        if path.startswith(PACKAGE_PREFIX):
+            return path
+        if message := describe_outside_path(folder, path):
             errors.append(file.make_error(key_path, "outside", message))
         elif path and os.path.isfile(folder / path):
-            if has_outside_link(folder, path):
-                message = f'"{path}" is a link to a file outside {folder}'
-                errors.append(file.make_error(key_path, "outside", message))
             models.append(folder / path)
             return str((folder / path).resolve())
         return path

@@ -90,8 +90,11 @@ def make_type_schema(declared_type: object) -> Schema:
 
 
 def make_arm_schema() -> Schema:
-    """Return the schema of an arm file."""
+    """Return the schema of an arm file; limits that a URDF can contain are optional."""
     arm = _make_model_schema(ArmFile)
+    arm["required"].remove("effort")
+    limits = arm["$defs"]["LimitsConfig"]
+    limits["required"] = [key for key in limits["required"] if key not in ("position_deg", "velocity_deg")]
     return {"$schema": DIALECT, "title": "An arm", **arm, "definitions": arm.pop("$defs")}
 
 
@@ -104,8 +107,7 @@ def make_cell_schema() -> Schema:
     sections = cell.pop("$defs")
     limits = {"required": sections["LimitsConfig"].pop("required")}
     sections["ArmConfig"]["else"]["properties"] = {"limits": limits}
-    for section in ("FlangeConfig", "ArmSimulationConfig"):
-        del sections[section]["required"]
+    del sections["FlangeConfig"]["required"]
     required = cell.pop("required")
     detector = sections["DetectorConfig"]
     complete_detector = {"type": detector["type"], "required": detector.pop("required")}

@@ -70,12 +70,13 @@ def find_configuration_pairs(
     """
     x, y, z = goal.position
     poses = [make_tool_down_pose((x, y, z + length)), make_tool_down_pose((x, y, z))]
+    direction = _find_turn_direction(kinematics, q_start)
+    yaws: list[float | None] = [direction * yaw for yaw in goal.yaws] or [None]
     for angle_step, margin in ((COARSE_ANGLE_STEP, PREFERRED_LIMIT_DISTANCE), (FINE_ANGLE_STEP, 0.0)):
-        (upper_qs, _), (lower_qs, branches) = (kinematics.solve_all(p, q_start, angle_step) for p in poses)
+        (upper_qs, lower_qs), branches = kinematics.solve_all(poses, q_start, angle_step)
         joint_range = kinematics.joint_range.shrink(margin)
         pairs_by_yaw = [
-            _turn_last_joint(upper_qs, lower_qs, joint_range, yaw, float(q_start[-1]))
-            for yaw in goal.yaws or (None,)
+            _turn_last_joint(upper_qs, lower_qs, joint_range, yaw, float(q_start[-1])) for yaw in yaws
         ]
         upper_qs, lower_qs = map(np.concatenate, zip(*pairs_by_yaw, strict=True))
         is_inside = joint_range.contains(upper_qs) & joint_range.contains(lower_qs)
@@ -111,7 +112,9 @@ def solve_vertical_waypoints(kinematics: Kinematics, q: Array, length: float, br
         Unreachable: A point of the line is too far from the arm or too near to the arm.
     """
     waypoints = _solve_waypoints(kinematics, kinematics.compute_tool_pose(q), length, branch)
-    return waypoints + wrap_angles(q - waypoints[0])
+    # The waypoints may be whole turns away from `q`.
+    turns = np.round((q - waypoints[0]) / math.tau)
+    return waypoints + wrap_angles(q - waypoints[0]) + math.tau * turns
 
 
 def _solve_waypoints(kinematics: Kinematics, X_WT: Pose, length: float, branch: BranchKey) -> Array:
@@ -122,18 +125,27 @@ def _solve_waypoints(kinematics: Kinematics, X_WT: Pose, length: float, branch: 
     return waypoints
 
 
+def _find_turn_direction(kinematics: Kinematics, q: Array) -> float:
+    """Return 1.0 if the last joint turns in the direction of the tool about the tool axis, otherwise -1.0."""
+    X_WT, X_WU = map(kinematics.compute_tool_pose, (q, np.append(q[:-1], q[-1] + 0.1)))
+    return float(np.sign((X_WT.inverse() @ X_WU).rotation[1, 0]))
+
+
 def _turn_last_joint(
     upper_qs: Array, lower_qs: Array, joint_range: JointRange, yaw: float | None, last_joint_start: float
 ) -> tuple[Array, Array]:
     """Return pairs `(N, n)` [rad] with the last joint turned from the yaw 0 of the tool to `yaw` [rad].
 
-    If `yaw` is None, the last joint gets the position in its range nearest to `last_joint_start` [rad].
+    The last joint gets the position in its range nearest to `last_joint_start` [rad].
     """
     upper_qs = upper_qs.copy()
     lower_qs = lower_qs.copy()
     change = wrap_angles(upper_qs[:, -1] - lower_qs[:, -1])
     if yaw is not None:
-        lower_qs[:, -1] = wrap_angles(lower_qs[:, -1] - yaw)
+        last = wrap_angles(lower_qs[:, -1] - yaw)
+        turned = last + math.tau * np.round((last_joint_start - last) / math.tau)
+        is_inside = (joint_range.lower[-1] <= turned) & (turned <= joint_range.upper[-1])
+        lower_qs[:, -1] = np.where(is_inside, turned, last)
     else:
         # Both ends of the line must be in the range.
         smallest = joint_range.lower[-1] - np.minimum(change, 0.0)
@@ -153,8 +165,10 @@ def _make_unreachable_error(
     for pose, qs in zip(poses, qs_by_pose, strict=True):
         x, y, z = pose.position
         if not np.any(kinematics.joint_range.contains(qs)):
-            excess = kinematics.joint_range.compute_excess(qs)
-            min_excess = excess[np.nanargmin(np.max(excess, axis=1))]
+            excess = kinematics.joint_range.compute_excess(qs[~np.isnan(qs).any(axis=1)])
+            if not len(excess):
+                continue  # No branch leads from the other pose to this pose.
+            min_excess = excess[np.argmin(np.max(excess, axis=1))]
             joint = int(np.argmax(min_excess))
             return Unreachable(
                 f"the tool cannot reach ({x:.3f}, {y:.3f}, {z:.3f}) m: no configuration of the arm keeps "
@@ -270,23 +284,27 @@ class CartesianLine:
         return speed, acceleration, float(np.min(remaining_jerks / (q_s + _MIN_DIVISOR)))
 
 
+def compute_stopping_distance(speed: float, acceleration: float, jerk: float) -> float:
+    """Return the distance [m] in which a tool stops.
+
+    `speed` [m/s], `acceleration` [m/s²] and `jerk` [m/s³] are its first speed and its limits.
+    """
+    if speed >= acceleration**2 / jerk:
+        stopping_time = speed / acceleration + acceleration / jerk
+    else:  # The deceleration does not reach its maximum.
+        stopping_time = 2 * math.sqrt(speed / jerk)
+    return speed / 2 * stopping_time
+
+
 def _find_max_end_speed(length: float, max_speed: float, acceleration: float, jerk: float) -> float:
     """Return the largest speed [m/s], up to `max_speed`, from which the tool can stop within `length` [m]."""
-
-    def compute_stopping_distance(speed: float) -> float:
-        if speed >= acceleration**2 / jerk:
-            stopping_time = speed / acceleration + acceleration / jerk
-        else:  # The deceleration does not reach its maximum.
-            stopping_time = 2 * math.sqrt(speed / jerk)
-        return speed / 2 * stopping_time
-
-    if compute_stopping_distance(max_speed) <= length:
+    if compute_stopping_distance(max_speed, acceleration, jerk) <= length:
         return max_speed
     lower = 0.0
     upper = max_speed
     for _ in range(40):
         middle = (lower + upper) / 2
-        if compute_stopping_distance(middle) <= length:
+        if compute_stopping_distance(middle, acceleration, jerk) <= length:
             lower = middle
         else:
             upper = middle

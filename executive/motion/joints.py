@@ -10,7 +10,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from executive.cell.arm_config import ArmFile, LimitsConfig
+from executive.cell.arm_config import ArmConfig, LimitsConfig
 from executive.cell.config import CellConfig
 from executive.errors import InputError
 from executive.geometry import Array, Pose
@@ -43,6 +43,10 @@ class JointRange(NamedTuple):
     def contains(self, qs: Array) -> NDArray[np.bool_]:
         """Return a mask `(...)` of the joint positions `(..., n)` [rad] within the range."""
         return np.asarray(np.all((self.lower <= qs) & (qs <= self.upper), axis=-1))
+
+    def without_last(self) -> JointRange:
+        """Return the range of all joints but the last."""
+        return JointRange(self.lower[:-1], self.upper[:-1])
 
     def compute_excess(self, qs: Array) -> Array:
         """Return the distance of each joint position `(..., n)` from the range [rad]; negative inside."""
@@ -115,7 +119,8 @@ class JointLimits:
 class Kinematics(Protocol):
     """Kinematics of an arm with `n` joints, and of the tool on its flange.
 
-    The base frame of the arm is the world frame. The tool axis is the axis of the last joint.
+    Poses are in the world, where the cell file places the base of the arm. The tool axis is the axis of the
+    last joint.
     """
 
     @property
@@ -124,9 +129,6 @@ class Kinematics(Protocol):
 
     def compute_tool_pose(self, q: ArrayLike) -> Pose:
         """Return the tool pose `X_WT` at the joint positions `q` `(n,)` [rad]."""
-
-    def compute_joint_frames(self, q: ArrayLike) -> tuple[Pose, ...]:
-        """Return the frame of each joint at `q` `(n,)` [rad]; each origin is the centre of its joint."""
 
     def compute_tcps_and_axes(self, qs: Array) -> tuple[Array, Array]:
         """Return tool centre points `(N, 3)` [m] and tool axes `(N, 3)` at joint positions `(N, n)` [rad]."""
@@ -142,17 +144,16 @@ class Kinematics(Protocol):
         """
 
     def solve_all(
-        self, X_WT: Pose, q_seed: ArrayLike, angle_step: float
+        self, poses: Sequence[Pose], q_seed: ArrayLike, angle_step: float
     ) -> tuple[Array, Sequence[BranchKey]]:
-        """Return the solutions `(N, n)` [rad] of a tool pose in all `N` branches, and the branch of each row.
+        """Return the solutions `(N, B, n)` [rad] of `N` poses on a line, and their `B` branches.
 
-        A solution may be outside of `joint_range`; a row without a solution is NaN.
-        A redundant arm has infinitely many branches; the function samples the redundancy angle at intervals
-        of `angle_step` [rad]. One sample is the redundancy angle of `q_seed` `(n,)` [rad]. Calls with equal
-        `q_seed` and `angle_step` return equal branches in equal order.
+        A solution may be outside of `joint_range`; it is NaN where a branch has none. A joint that can turn
+        more than once is near its position in `q_seed` `(n,)` [rad]. A redundant arm has infinitely many
+        branches, of which the function returns samples: the more, the smaller `angle_step` [rad] is.
 
         Raises:
-            Unreachable: The pose is too near to the arm or too far from the arm.
+            Unreachable: A pose is too near to the arm or too far from the arm.
         """
 
 
@@ -160,12 +161,12 @@ class KinematicsFactory(Protocol):
     """A solver: function or class that builds the kinematics of an arm."""
 
     def __call__(
-        self, arm: ArmFile, tool_length: float, min_link_distance: float | None = None
+        self, arm: ArmConfig, tool_length: float, min_link_distance: float | None = None
     ) -> Kinematics:
         """Return the kinematics of an arm with a tool.
 
         Args:
-            arm: The arm file.
+            arm: The arm of a cell.
             tool_length: Distance from the flange to the tool centre point [m].
             min_link_distance: Minimum distance between links of the wrist [m], which may make the range of
                 the joints narrower than the limits, or None.

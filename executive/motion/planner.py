@@ -9,7 +9,7 @@ instead of a timeout, so that equal queries have equal results.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,7 +30,6 @@ from executive.motion.joints import JointLimits, Kinematics, build_planning_kine
 from executive.motion.optimizer import MotionProblem
 from executive.motion.search import EXTRA_HEIGHTS, MotionSearch
 from executive.motion.trajectory import JointLimitError, Trajectory, downsample_path
-from executive.text.validate import KeyPath
 
 CollisionCheck = Callable[[Array, Task], None]
 """Function that raises Blocked if the path `(N, n)` [rad] of a task collides."""
@@ -205,34 +204,3 @@ def _interpolate(corners: Array, min_last_time: float) -> Array:
     corner_times = np.cumsum([0.0, *times])
     step_times = np.append(np.arange(STEP, corner_times[-1], STEP), corner_times[-1])
     return np.column_stack([np.interp(step_times, corner_times, joint) for joint in corners.T])
-
-
-def find_places_out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield key and message for each place or named pose of the cell file that the arm cannot reach.
-
-    The tool must reach each slot of each bin and the safe place, from travel height down to the release
-    height in one inverse kinematics branch. Each named pose must be within the joint limits.
-    """
-    ranges = config.arm.limits.position_ranges_deg
-    for name, pose in config.arm.poses_deg.items():
-        for joint, (angle, (lower, upper)) in enumerate(zip(pose, ranges, strict=True), start=1):
-            if not lower <= angle <= upper:
-                limit = f"{upper:g}" if lower == -upper else f"{lower:g} to {upper:g}"
-                message = f'joint {joint} of the pose "{name}" is at {angle:g} degrees; its limit is {limit}'
-                yield ("arm", "poses_deg", name), message
-    kinematics = build_planning_kinematics(config)
-    q_start = np.zeros(config.arm.joint_count)
-    places: list[tuple[KeyPath, str, Array, float]] = [
-        (("bins", name, "position"), f'the bin "{name}"', bin.build_bin(name).slots, bin.position[2])
-        for name, bin in config.bins.items()
-    ]
-    safe_position = np.array([config.safe_place[:2]])
-    places.append((("safe_place",), "the safe place", safe_position, config.safe_place[2]))
-    for key_path, place_name, positions, surface_height in places:
-        height = surface_height + config.max_hold_height
-        approach_height = max(0.0, config.travel_height - height)
-        try:
-            for x, y in positions.tolist():
-                find_configuration_pairs(kinematics, Goal((x, y, height)), approach_height, q_start)
-        except Unreachable as error:
-            yield key_path, f"{place_name} is out of reach: {error}"

@@ -1,41 +1,42 @@
 """PyBullet model of a cell: arm with tool, table and bins, without objects and without time.
 
-The origin of the world frame W is at the base of the arm, on the table top.
+The origin of the world frame W is on the table top.
 """
 
 from __future__ import annotations
 
+import math
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from string import Template
+from typing import Any
 
 import numpy as np
 import pybullet
 from pybullet_utils.bullet_client import BulletClient
 
+from executive.arms.urdf import find_model, locate_flange, read_chain
 from executive.cell.arm_config import TOOL_LINK
 from executive.cell.config import BinConfig, CellConfig
 from executive.cell.device_config import STEP
 from executive.cell.objects import BIN_THICKNESS
 from executive.geometry import Array, Pose
-from executive.physics.model_files import find_model
+from executive.physics.arm_model import build_arm_urdf
 
 TABLE_HEIGHT = 0.625
 """Height of the table in pybullet_data [m]."""
 TABLE_CENTRE = (0.40, 0.0)
 """Centre of the table top in the world [m]; the table top is 1.0 m long along x and 1.5 m along y."""
-CYLINDER_MARGIN = 0.001
-"""Collision margin that Bullet adds on all sides to a cylinder of a URDF [m]."""
-TOOL_MASS = 0.1
-"""Mass of the tool [kg]."""
 # Indices of values in a contact point or closest point of PyBullet, for a query with the bodies A and B.
 BODY_B = 2
 LINK_A = 3
 POSITION_A = 5
 POSITION_B = 6
+NORMAL = 7
 DISTANCE = 8
 NORMAL_FORCE = 9
+JOINT_NAME = 1
+"""Index of the name of the joint in the information about a joint of PyBullet."""
 LINK_NAME = 12
 """Index of the name of the link in the information about a joint of PyBullet."""
 
@@ -51,8 +52,10 @@ class CellWorld:
     Attributes:
         config: The cell file.
         client: The connection to the physics server, which identifies bodies by integers.
-        arm: Body of the arm, fixed at the origin.
-        joints: Indices of the joints of the arm, which are also the indices of the links up to the flange.
+        arm: Body of the arm, fixed at its base, with the tool.
+        arm_urdf: URDF of this body.
+        joints: Indices of the joints of the arm, which are also the indices of the links that they move.
+        joint_counts: Number of joints before each link of the arm, by the index of the link; -1: the base.
         flange_index: Index of the link with the flange.
         tool_index: Index of the link of the tool, whose frame is the frame of the flange.
         table, floor: Bodies of the table and of the floor under the table.
@@ -71,24 +74,43 @@ class CellWorld:
         position = [*TABLE_CENTRE, -TABLE_HEIGHT]
         quaternion = self.client.getQuaternionFromEuler([0, 0, np.pi / 2])
         self.table = self.client.loadURDF(urdf, position, quaternion, useFixedBase=True, flags=flags)
-        self.arm = self._load_arm(flags)
-        self._link_indices = {
-            self.client.getJointInfo(self.arm, index)[LINK_NAME].decode(): index
-            for index in range(self.client.getNumJoints(self.arm))
-        }
+        self.arm_urdf = build_arm_urdf(config, visuals=visuals)
+        base = config.arm.base
+        turn = self.client.getQuaternionFromEuler([0, 0, math.radians(base.yaw_deg)])
+        # PyBullet ignores collisions between links of one body, so that tool and wrist may overlap.
+        self.arm = load_urdf_text(
+            self.client, self.arm_urdf, basePosition=base.position, baseOrientation=turn, flags=flags
+        )
+        infos = [
+            self.client.getJointInfo(self.arm, index) for index in range(self.client.getNumJoints(self.arm))
+        ]
+        link_names = [info[LINK_NAME].decode() for info in infos]
+        self._link_indices = {name: index for index, name in enumerate(link_names)}
         self.flange_index = self.find_link(config.arm.flange.link)
         self.tool_index = self.find_link(TOOL_LINK)
-        self.joints = range(self.flange_index + 1)
+        self._X_LF = locate_flange(config.arm.flange)  # L is the frame of the link with the flange.
+        chain = read_chain(config.arm.urdf, config.arm.flange)
+        joint_names = [info[JOINT_NAME].decode() for info in infos]
+        self.joints = [joint_names.index(name) for name in chain.joints]
+        counts = {name: count for name, (count, _) in chain.places.items()} | {TOOL_LINK: len(self.joints)}
+        self.joint_counts = {-1: 0, **{index: counts[name] for index, name in enumerate(link_names)}}
         self.bin_bodies = {name: add_bin(self.client, bin) for name, bin in config.bins.items()}
         self.set_joint_positions(np.radians(config.arm.poses_deg["home"]))
 
     def find_link(self, name: str) -> int:
-        """Return the index of a link of the arm, by its name in the URDF."""
-        return self._link_indices[name]
+        """Return the index of a link of the arm, by its name in the URDF; -1 for the base."""
+        return self._link_indices.get(name, -1)
+
+    def get_link_name(self, link: int) -> str:
+        """Return the name of a link of the arm in the URDF, by its index."""
+        return next((name for name, index in self._link_indices.items() if index == link), "base")
 
     def name_link(self, link: int) -> str:
         """Return the name of a link of the arm for messages, by its index."""
-        return "the tool" if link == self.tool_index else f"link {link + 1}"
+        if link == self.tool_index:
+            return "the tool"
+        count = self.joint_counts[link]
+        return f"link {count}" if count else "the base of the arm"
 
     def get_joint_positions(self) -> Array:
         """Return the joint positions of the arm `(n,)` [rad]."""
@@ -97,13 +119,13 @@ class CellWorld:
 
     def set_joint_positions(self, q: Sequence[float] | Array) -> None:
         """Move the arm to joint positions `q` `(n,)` [rad] at once, without physics or collision checks."""
-        for joint, angle in enumerate(q):
+        for joint, angle in zip(self.joints, q, strict=True):
             self.client.resetJointState(self.arm, joint, angle)
 
     def get_flange_pose(self) -> Pose:
         """Return `X_WF`, the pose of the flange."""
         state = self.client.getLinkState(self.arm, self.flange_index, computeForwardKinematics=True)
-        return Pose.of(*state[4:6]) @ Pose.of([0, 0, self.config.arm.flange.offset])
+        return Pose.of(*state[4:6]) @ self._X_LF
 
     def get_tool_pose(self) -> Pose:
         """Return `X_WT`, the pose of the tool centre point."""
@@ -113,35 +135,14 @@ class CellWorld:
         """Disconnect from the physics server; the world cannot be used afterwards."""
         self.client.disconnect()
 
-    def _load_arm(self, flags: int) -> int:
-        """Load the arm with the tool as an additional fixed link, and return the body.
 
-        A fixed link has no drift, in contrast to a constraint between two bodies. PyBullet by default
-        ignores collisions between links of one body, so that tool and wrist may overlap.
-        """
-        path = find_model(self.config.arm.urdf)
-        text = path.read_text().replace('filename="meshes/', f'filename="{path.parent}/meshes/')
-        tool = self.config.tool
-        text_of_tool, text_of_part = Path(__file__).with_name("tool.urdf").read_text().split("</robot>\n")
-        part_template = Template(text_of_part)
-        parts = "".join(
-            part_template.substitute(
-                centre=tool.length - part.offset - part.length / 2,
-                length=part.length,
-                radius=part.radius,
-                collision_length=part.length - 2 * CYLINDER_MARGIN,
-                collision_radius=part.radius - CYLINDER_MARGIN,
-            )
-            for part in tool.parts
-        )
-        flange = self.config.arm.flange
-        values = {"flange_link": flange.link, "flange_offset": flange.offset}
-        values |= {"centre": tool.length / 2, "mass": TOOL_MASS, "parts": parts}
-        text = text.replace("</robot>", Template(text_of_tool).substitute(values) + "</robot>")
-        with tempfile.TemporaryDirectory() as folder:
-            urdf_path = Path(folder) / "arm_with_tool.urdf"
-            urdf_path.write_text(text)
-            return int(self.client.loadURDF(str(urdf_path), useFixedBase=True, flags=flags))
+def load_urdf_text(client: BulletClient, text: str, **options: Any) -> int:
+    """Load a URDF from its text as a fixed body, and return the body; `options` are those of `loadURDF`."""
+    # PyBullet stores models by their path; the name of the folder is new.
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "model.urdf"
+        path.write_text(text, encoding="utf-8")
+        return int(client.loadURDF(str(path), useFixedBase=True, **options))
 
 
 def name_load(label: str) -> str:

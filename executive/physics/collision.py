@@ -5,20 +5,30 @@ The check uses a separate world, because moving the arm of the running world wou
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from functools import lru_cache
 from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
 import pybullet
+from pybullet_utils.bullet_client import BulletClient
 
 from executive.cell.arm import Task
 from executive.cell.config import CellConfig
 from executive.cell.objects import BIN_THICKNESS, ObjectClass, Obstacle
 from executive.errors import Blocked
 from executive.geometry import Array, format_point
-from executive.physics.cell_world import DISTANCE, LINK_A, POSITION_B, CellWorld, name_load
+from executive.physics.cell_world import (
+    DISTANCE,
+    LINK_A,
+    POSITION_B,
+    CellWorld,
+    load_urdf_text,
+    name_load,
+)
 
 ROUNDING_ERROR = 1e-5
 """Maximum rounding error of a distance [m]."""
@@ -28,6 +38,14 @@ MAX_CYLINDER_COUNT = 300
 """Number of stored cylinders above which all are removed; each needs 10 kB."""
 JOINT_AXIS = 13
 """Index of the axis of the joint in the information about a joint of PyBullet."""
+WRIST_JOINT_COUNT = 2
+"""Number of the last joints, whose links a held object is permitted to touch."""
+SAMPLE_COUNT = 200
+"""Number of random poses in which the pairs of links that can collide are searched."""
+NEAR_DISTANCE = 0.03
+"""Maximum distance in one of these poses of two links that can collide [m]."""
+MAX_TOUCH_FRACTION = 0.9
+"""Maximum fraction of these poses in which two links touch; a larger fraction is due to their hulls."""
 SUPPORT_TOLERANCE = 0.001
 """Maximum height above the table or the floor of a bin at which a contact supports the load [m]."""
 
@@ -39,7 +57,7 @@ class BodyPair(NamedTuple):
         bodies: Indices of both bodies.
         link_pair: Indices of two links of the arm, or () if all links of the bodies count.
         links: Links of the first body whose distances count.
-        joints: Joints that change the distance.
+        joints: Indices of the joints that change the distance, from 0.
         body_name: Name of the second body in messages; "" for the pair of arm and load, whose messages name
             the load first, and then the nearest link of the arm.
         load_name: Name of the load if it belongs to the pair, else "".
@@ -47,8 +65,8 @@ class BodyPair(NamedTuple):
     """
 
     bodies: tuple[int, int]
-    links: range
-    joints: range
+    links: Collection[int]
+    joints: Sequence[int]
     body_name: str = ""
     load_name: str = ""
     support_height: float = -math.inf
@@ -87,6 +105,7 @@ class ClearanceChecker:
 
     Attributes:
         world: World of the check, whose arm is at the last joint positions that needed a query.
+        self_collision_pairs: Indices of the links that can collide with each other.
     """
 
     def __init__(self, config: CellConfig) -> None:
@@ -97,6 +116,7 @@ class ClearanceChecker:
         # The function is looked up once, because a look-up takes as long as a call.
         self._get_closest_points = self.world.client.getClosestPoints
         self._radii = self._compute_max_radii()
+        self.self_collision_pairs = find_self_collision_pairs(self.world)
 
     def check(self, path: Array, task: Task = Task()) -> None:
         """Check that the joint positions along a path `(N, n)` [rad] keep the margin of the cell file.
@@ -151,17 +171,15 @@ class ClearanceChecker:
     def _list_pairs(self, load: ObjectClass | None, obstacles: Sequence[tuple[str, int]]) -> list[BodyPair]:
         """Return all pairs; `obstacles` contains name and body of each obstacle."""
         world = self.world
-        simulation = world.config.arm.simulation
-        first_link = world.find_link(simulation.first_collision_link)
-        joints = world.joints
+        counts = world.joint_counts
+        joints = range(len(world.joints))
         bodies = [("the table", world.table), *world.bin_bodies.items(), *obstacles]
-        links = range(first_link, world.tool_index + 1)
+        # Joint 1 turns the first link about the axis of the base.
+        links = [link for link, count in counts.items() if count > 1]
         pairs = [BodyPair((world.arm, body), links, joints, body_name=name) for name, body in bodies]
-        for names in simulation.self_collision_pairs:
-            link_a, link_b = map(world.find_link, names)
-            moving_joints = joints[min(link_a, link_b) + 1 : max(link_a, link_b) + 1]
-            first_links = range(link_a, link_a + 1)
-            pair = BodyPair((world.arm, world.arm), first_links, moving_joints, world.name_link(link_b))
+        for link_a, link_b in self.self_collision_pairs:
+            first, last = sorted((counts[link_a], counts[link_b]))
+            pair = BodyPair((world.arm, world.arm), [link_a], joints[first:last], world.name_link(link_b))
             pairs.append(pair._replace(link_pair=(link_a, link_b)))
         if load is None:
             return pairs
@@ -172,10 +190,10 @@ class ClearanceChecker:
             if body == world.table or body_name in world.bin_bodies:
                 bin = world.config.bins.get(body_name)
                 support_height = (bin.position[2] if bin else 0.0) + BIN_THICKNESS + SUPPORT_TOLERANCE
-            pairs.append(BodyPair((load_body, body), range(-1, 0), joints, body_name, name, support_height))
-        lower_links = range(first_link, world.find_link(simulation.wrist_link))
-        lower_joints = joints[lower_links.start + 1 :]
-        return [*pairs, BodyPair((world.arm, load_body), lower_links, lower_joints, load_name=name)]
+            pairs.append(BodyPair((load_body, body), [-1], joints, body_name, name, support_height))
+        # The load may touch the wrist.
+        lower_links = [link for link in links if counts[link] <= len(joints) - WRIST_JOINT_COUNT]
+        return [*pairs, BodyPair((world.arm, load_body), lower_links, joints[2:], load_name=name)]
 
     def _measure_distance(self, pair: BodyPair) -> tuple[float, list[ClosestApproach]]:
         """Return the distance of a pair [m], and a `ClosestApproach` for each pair of points in the margin.
@@ -201,10 +219,10 @@ class ClearanceChecker:
         """Move the arm to joint positions `(n,)` [rad], with the load under the tool."""
         world = self.world
         client = world.client
-        client.resetJointStatesMultiDof(world.arm, range(len(q)), [[angle] for angle in q])
+        client.resetJointStatesMultiDof(world.arm, world.joints, [[angle] for angle in q])
         if load is not None:
-            flange = client.getLinkState(world.arm, world.flange_index, computeForwardKinematics=True)[4:6]
-            offset = world.config.arm.flange.offset + world.config.tool.length
+            flange = client.getLinkState(world.arm, world.tool_index, computeForwardKinematics=True)[4:6]
+            offset = world.config.tool.length
             offset += world.config.tool.get_hold_height(load) - load.height / 2
             load_pose = client.multiplyTransforms(*flange, [0, 0, offset], [0, 0, 0, 1])
             client.resetBasePositionAndOrientation(self._get_load_body(load), *load_pose)
@@ -221,16 +239,24 @@ class ClearanceChecker:
             client.rotateVector(state[5], client.getJointInfo(world.arm, joint)[JOINT_AXIS])
             for joint, state in zip(world.joints, states, strict=True)
         ]
-        links = np.diff([*(state[4] for state in states), world.get_tool_pose().position], axis=0)
+        origins = np.array([*(state[4] for state in states), world.get_tool_pose().position])
+        links = np.diff(origins, axis=0)
         lengths = np.linalg.norm(links, axis=1)
+        # Maximum distance of a point of the links after each joint from the origin of the joint.
+        sizes = np.zeros(len(lengths))
+        for link, count in world.joint_counts.items():
+            if count and client.getCollisionShapeData(world.arm, link):
+                corners = np.array([*itertools.product(*zip(*client.getAABB(world.arm, link), strict=True))])
+                size = float(np.linalg.norm(corners - origins[count - 1], axis=1).max())
+                sizes[count - 1] = max(sizes[count - 1], size)
         # The link of a joint counts only with its component perpendicular to the axis of the joint.
-        perpendicular_lengths = np.linalg.norm(np.cross(axes, links), axis=1)
-        return (
-            perpendicular_lengths
-            + lengths[::-1].cumsum()[::-1]
-            - lengths
-            + world.config.arm.simulation.link_radius
-        )
+        radii = np.linalg.norm(np.cross(axes, links), axis=1)
+        paths = np.cumsum(lengths) - lengths  # from the first joint to each joint
+        for joint in range(len(radii)):
+            # A point of a later link is at most the path to its joint and its size away.
+            later_sizes = paths[joint + 1 :] - paths[joint] - lengths[joint] + sizes[joint + 1 :]
+            radii[joint] = max(sizes[joint], radii[joint] + later_sizes.max(initial=0.0))
+        return radii
 
     def _place_obstacles(self, obstacles: Sequence[Obstacle]) -> list[tuple[str, int]]:
         """Represent the obstacles by cylinders on the table; return name and body of each obstacle."""
@@ -254,3 +280,47 @@ class ClearanceChecker:
             shape = client.createCollisionShape(pybullet.GEOM_CYLINDER, radius=radius, height=height)
             self._cylinders[key] = int(client.createMultiBody(0, shape))
         return self._cylinders[key]
+
+
+def find_self_collision_pairs(world: CellWorld) -> tuple[tuple[int, int], ...]:
+    """Return the pairs of links that can collide with each other, by their indices.
+
+    If the arm file names no pairs, they are the pairs of links that come near to each other in random poses.
+    Neighbouring links are no pair, because their hulls mostly overlap.
+    """
+    arm = world.config.arm
+    if arm.self_collision_pairs is not None:
+        return tuple((world.find_link(a), world.find_link(b)) for a, b in arm.self_collision_pairs)
+    counts = tuple(world.joint_counts.items())
+    return _search_pairs(world.arm_urdf, tuple(world.joints), counts, arm.limits.position_ranges_deg)
+
+
+@lru_cache(maxsize=8)
+def _search_pairs(
+    urdf: str,
+    joints: tuple[int, ...],
+    joint_counts: tuple[tuple[int, int], ...],
+    ranges_deg: tuple[tuple[float, float], ...],
+) -> tuple[tuple[int, int], ...]:
+    """Return the pairs of links of a URDF that come near to each other in a world of their own.
+
+    The search takes 0.05 s. `joints` and `joint_counts` are as in `CellWorld`.
+    """
+    client = BulletClient(pybullet.DIRECT)
+    arm = load_urdf_text(client, urdf, flags=pybullet.URDF_IGNORE_VISUAL_SHAPES)
+    counts = dict(joint_counts)
+    links = [link for link in counts if client.getCollisionShapeData(arm, link)]
+    pairs = [(a, b) for a, b in itertools.combinations(links, 2) if abs(counts[a] - counts[b]) > 1]
+    near_counts = dict.fromkeys(pairs, 0)
+    touch_counts = dict.fromkeys(pairs, 0)
+    rng = np.random.default_rng(0)
+    lower, upper = np.radians(ranges_deg).T.clip(-math.pi, math.pi)
+    for q in rng.uniform(lower, upper, (SAMPLE_COUNT, len(lower))):
+        client.resetJointStatesMultiDof(arm, joints, [[angle] for angle in q])
+        for pair in pairs:
+            points = client.getClosestPoints(arm, arm, NEAR_DISTANCE, *pair)
+            near_counts[pair] += bool(points)
+            touch_counts[pair] += any(point[DISTANCE] < 0 for point in points)
+    client.disconnect()
+    max_touch_count = MAX_TOUCH_FRACTION * SAMPLE_COUNT
+    return tuple(pair for pair in pairs if near_counts[pair] and touch_counts[pair] <= max_touch_count)

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import io
-import math
 import os
 import re
 import tempfile
 import warnings
 import zipfile
-from collections.abc import Iterator
 from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
@@ -22,15 +20,11 @@ import pybullet
 import pybullet_data
 from numpy.typing import ArrayLike, NDArray
 
-from executive.cell.arm_config import TOOL_LINK, ArmFile
+from executive.arms.urdf import find_model, find_package_folder, parse_numbers, read_origin, read_robot
 from executive.errors import InputError
-from executive.geometry import Array, Pose, rotate_about_z
+from executive.geometry import Array, Pose
 from executive.text.files import get_shipped_folder, has_outside_link, is_outside_path, read_image_header
-from executive.text.findings import suggest_choice
-from executive.text.validate import KeyPath
 
-MAX_MODEL_SIZE = 20_000_000
-"""Maximum size of a model file [byte], to limit the duration of the check."""
 MAX_TRIANGLE_COUNT = 20_000
 """Maximum number of triangles of a mesh: a collision in PyBullet takes 3 s with 20,000, 60 s with 300,000."""
 MAX_GROUP_COUNT = 1_000
@@ -47,40 +41,10 @@ Triangles = tuple[Array, NDArray[np.intp]]
 """Vertices `(N, 3)` [m], and the indices of the vertices of each triangle `(M, 3)`."""
 
 
-def find_model(name: str) -> Path:
-    """Return the path of a model file, for an absolute path or a path in the folder of pybullet_data.
-
-    Raises:
-        InputError: There is no such file, or the file is larger than `MAX_MODEL_SIZE`.
-    """
-    path = os.path.join(pybullet_data.getDataPath(), name)
-    # For an invalid file name, Path.is_file raises an error, but os.path.isfile returns False.
-    if os.path.isfile(path):
-        if os.path.getsize(path) > MAX_MODEL_SIZE:
-            raise InputError(f"the model {name} is larger than {MAX_MODEL_SIZE // 1_000_000} MB")
-        return Path(path).resolve()
-    raise InputError(f"there is no model {name}, neither beside the cell file nor in pybullet_data")
-
-
 def is_shipped(path: Path) -> bool:
     """Return True if a model belongs to pybullet_data or to the executive."""
     folders = (Path(pybullet_data.getDataPath()), get_shipped_folder() / "cells" / "fasteners")
     return any(path.is_relative_to(folder.resolve()) for folder in folders)
-
-
-def read_robot(path: Path) -> Element:
-    """Return the root element of a URDF.
-
-    Raises:
-        InputError: The file is no URDF.
-    """
-    try:
-        root = ElementTree.parse(path).getroot()
-    except (ElementTree.ParseError, OSError, ValueError, LookupError) as error:
-        raise InputError(f"the model {path.name} is no URDF: {error}") from None
-    if root.tag != "robot":
-        raise InputError(f"the model {path.name} is no URDF: its root is <{root.tag}>, not <robot>")
-    return root
 
 
 def read_urdf(path: Path) -> Element:
@@ -109,7 +73,7 @@ def check_files(path: Path, root: Element, max_triangle_count: float = MAX_TRIAN
         elif element.tag == "texture":
             read_image_header(find_mesh(path, element))
         elif "filename" in element.attrib:
-            _normalize_name(path, element.attrib["filename"])
+            _locate_file(path, element.attrib["filename"])
 
 
 def _merge_links(path: Path, root: Element) -> None:
@@ -122,12 +86,12 @@ def _merge_links(path: Path, root: Element) -> None:
         X_BL = Pose.identity()
         left = dict(joints)  # each joint is passed once, even in a loop of joints
         while (joint := left.pop(base, None)) is not None:
-            X_BL = _read_origin(path, joint) @ X_BL
+            X_BL = read_origin(path, joint) @ X_BL
             base = joint.findall("parent")[0].get("link")
         if base == name or base not in links:
             continue
         for part in link:
-            X_BP = X_BL @ _read_origin(path, part)
+            X_BP = X_BL @ read_origin(path, part)
             angles = pybullet.getEulerFromQuaternion(X_BP.quaternion)
             xyz, rpy = (" ".join(map(str, numbers)) for numbers in (X_BP.position, angles))
             part[:] = [child for child in part if child.tag != "origin"]
@@ -135,13 +99,6 @@ def _merge_links(path: Path, root: Element) -> None:
         links[base].extend(link)
         root.remove(link)
         root.remove(joints[name])
-
-
-def _read_origin(path: Path, element: Element) -> Pose:
-    """Return the pose in the `origin` of an element of a URDF."""
-    origin = next(element.iter("origin"), Element("origin"))
-    xyz, rpy = (parse_numbers(path, origin, key, (0.0, 0.0, 0.0)) for key in ("xyz", "rpy"))
-    return Pose(make_rotation(*rpy), np.array(xyz))
 
 
 def read_shapes(path: Path, tag: str) -> Triangles:
@@ -154,7 +111,7 @@ def read_shapes(path: Path, tag: str) -> Triangles:
     vertices: list[Array] = []
     triangles: list[NDArray[np.intp]] = []
     for element in root.iterfind(f"link/{tag}"):
-        X_LE = _read_origin(path, element)
+        X_LE = read_origin(path, element)
         for shape in element.iterfind("geometry/*"):
             points, faces = _read_shape(path, shape)
             triangles.append(faces + sum(map(len, vertices)))  # indices count the vertices of earlier shapes
@@ -188,7 +145,7 @@ def _read_shape(path: Path, shape: Element) -> Triangles:
 
 
 @lru_cache(maxsize=64)
-def convert_model(path: Path) -> str:
+def convert_model(path: Path, max_triangle_count: float = MAX_TRIANGLE_COUNT) -> str:
     """Return the path of a URDF or mesh that contains Wavefront meshes only.
 
     PyBullet crashes, ignores units or reads nothing for some STL and COLLADA meshes. The files of converted
@@ -199,15 +156,16 @@ def convert_model(path: Path) -> str:
     if path.suffix.lower() in MESH_KINDS:
         import trimesh  # the import takes a second
 
-        content = str(trimesh.Trimesh(*read_mesh(path), process=False).export(file_type="obj")).encode()
+        mesh = trimesh.Trimesh(*read_mesh(path, max_triangle_count), process=False)
+        content = str(mesh.export(file_type="obj")).encode()
     else:
         root = read_urdf(path)
-        files = [(mesh, find_mesh(path, mesh)) for mesh in root.iter("mesh")]
-        names = [str(path.parent / mesh.attrib["filename"]) for mesh, _ in files]
+        files = [(element, find_mesh(path, element)) for element in root.iter("mesh")]
+        names = [str(path.parent / element.attrib["filename"]) for element, _ in files]
         if names == [convert_model(file) for _, file in files] and b"<joint" not in path.read_bytes():
             return str(path)
-        for mesh, file in files:
-            mesh.set("filename", convert_model(file))
+        for element, file in files:
+            element.set("filename", convert_model(file))
         content = ElementTree.tostring(root)
     suffix = ".obj" if path.suffix.lower() in MESH_KINDS else ".urdf"
     with tempfile.NamedTemporaryFile(suffix=suffix, dir=_make_folder().name, delete=False) as target:
@@ -226,7 +184,12 @@ def find_mesh(urdf: Path, mesh: Element) -> Path:
     Raises:
         InputError: It is no file in the folder of the URDF, or is too large.
     """
-    return find_model(str(urdf.parent / _normalize_name(urdf, mesh.get("filename", ""))))
+    name = mesh.get("filename", "")
+    file = os.path.abspath(_locate_file(urdf, name))
+    if not os.path.isfile(file):
+        problem = f'the model {urdf.name} names the file "{name}", but there is no file {file}'
+        raise InputError(f"{problem}; copy the file there, or correct the name")
+    return find_model(file)
 
 
 def list_model_files(model: Path) -> list[Path]:
@@ -259,29 +222,45 @@ def list_named_files(path: Path) -> list[Path]:
     names = dict.fromkeys(name for value in values for name in (value.strip(), *value.split()))
     if len(names) > MAX_GROUP_COUNT:
         raise InputError(f"the model {path.name} names more than {MAX_GROUP_COUNT} files; join them")
-    named_files = [path.parent / _normalize_name(path, name) for name in names]
+    # A missing file of another computer, such as D:\colours.png, is no file outside of the folder.
+    is_elsewhere = re.compile(r"[A-Za-z]:\\[^/]*").fullmatch
+    named_files = [
+        _locate_file(path, name) for name in names if os.path.lexists(name) or not is_elsewhere(name)
+    ]
     existing_files = [file for file in dict.fromkeys(named_files) if os.path.lexists(file)]
     for file in existing_files:
         find_model(str(file.absolute()))
     return existing_files
 
 
-def _normalize_name(urdf: Path, name: str) -> str:
-    """Return a file name without `package://NAME/`, `file://` etc., relative to the URDF's folder.
+def _locate_file(path: Path, name: str) -> Path:
+    """Return the path of a file that a model names, without `package://NAME/`, `file://` etc.
+
+    `package://NAME/` is the nearest parent folder NAME of the model, else the installed package NAME, else
+    the folder of the model. The files of an installed package may name each other by `..`.
 
     Raises:
-        InputError: The file is outside of the folder and of the shipped folders.
+        InputError: The file is outside of the folder, of the package and of the shipped folders.
     """
-    scheme, path = re.findall(r"^(?:(\w+):(?://)?)?(.*)", name)[0]
-    if scheme in ("package", "model") and not (urdf.parent / path).exists():
-        path = path.partition("/")[2]
-    if os.path.isabs(path):
-        path = os.path.relpath(os.path.realpath(unquote(path) if scheme else path), urdf.parent)
-    is_foreign = scheme not in ("", "file", "package", "model") or is_outside_path(path)
-    if not is_shipped((urdf.parent / path).resolve()) and (is_foreign or has_outside_link(urdf.parent, path)):
-        problem = f'the model {urdf.name} names the file "{name}", which is outside of its folder'
+    folder = path.parent
+    scheme, rest = re.findall(r"^(?:(\w+):(?://)?)?(.*)", name)[0]
+    if scheme in ("package", "model") and not (folder / rest).exists():
+        package, _, rest = rest.partition("/")
+        parents = [parent for parent in path.parents if parent.name == package]
+        folder = parents[0] if parents else find_package_folder(package) or folder
+    if ".." in rest.split("/"):
+        for parent in path.parents:
+            found = find_package_folder(parent.name)
+            if found and found.resolve() == parent and (parent / "__init__.py").is_file():
+                rest = os.path.relpath(os.path.normpath(folder / rest), parent)
+                folder = parent
+    if os.path.isabs(rest):
+        rest = os.path.relpath(os.path.realpath(unquote(rest) if scheme else rest), folder)
+    is_foreign = scheme not in ("", "file", "package", "model") or is_outside_path(rest)
+    if not is_shipped((folder / rest).resolve()) and (is_foreign or has_outside_link(folder, rest)):
+        problem = f'the model {path.name} names the file "{name}", which is outside of its folder'
         raise InputError(f"{problem}; copy the file into the folder, and name it without a folder")
-    return path
+    return folder / rest
 
 
 @lru_cache(maxsize=64)
@@ -343,15 +322,20 @@ def _read_wavefront(path: Path) -> tuple[ArrayLike, ArrayLike]:
 
 def _read_with_trimesh(path: Path, suffix: str) -> tuple[ArrayLike, ArrayLike]:
     """Read an STL or COLLADA file, the latter with its unit, but, like PyBullet, without its `up_axis`."""
-    import trimesh  # the import takes a second
-
     content = path.read_bytes()
     if suffix == ".stl":
         # A binary file has a header of 80 bytes, the number of triangles, and 50 bytes for each triangle.
         content = content[: 84 + 50 * int.from_bytes(content[80:84], "little")]
+        if len(content) > 84 and len(content) % 50 == 34 and not content.startswith(b"solid"):
+            triangles = np.frombuffer(
+                content, [("normal", "<f4", 3), ("corners", "<f4", 9), ("", "<u2")], offset=84
+            )
+            return np.unique(triangles["corners"].reshape(-1, 3), axis=0, return_inverse=True)
     elif zipfile.is_zipfile(path) or re.search(rb"\bnan\b", content, re.IGNORECASE):
         # trimesh would unpack an archive of any size, and replace NaN by 0.
         raise ValueError("it is an archive, or contains NaN")
+    import trimesh  # the import takes a second
+
     with warnings.catch_warnings(), np.errstate(invalid="ignore"):
         warnings.simplefilter("error", DeprecationWarning)  # NumPy warns about text that is no number
         scene = trimesh.load_scene(io.BytesIO(content), suffix[1:], process=False, ignore_broken=False)
@@ -359,71 +343,3 @@ def _read_with_trimesh(path: Path, suffix: str) -> tuple[ArrayLike, ArrayLike]:
             scene = scene.convert_units("meters")
         corners = scene.to_mesh().triangles.reshape(-1, 3)
     return np.unique(corners, axis=0, return_inverse=True)
-
-
-def make_rotation(roll: float, pitch: float, yaw: float) -> Array:
-    """Return the rotation matrix for the angles in a URDF [rad]: about the fixed axes x, then y, then z."""
-    cr, cp = np.cos([roll, pitch])
-    sr, sp = np.sin([roll, pitch])
-    about_x = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
-    about_y = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
-    return np.asarray(rotate_about_z(yaw) @ about_y @ about_x)
-
-
-def parse_numbers(
-    path: Path, element: Element, key: str, default: tuple[float, ...], minimum: float = -math.inf
-) -> tuple[float, ...]:
-    """Return the numbers in an attribute of a URDF, or `default` if the attribute is missing.
-
-    Raises:
-        InputError: The numbers are not as many finite numbers as in `default`, or not above `minimum`.
-    """
-    text = element.get(key)
-    try:
-        numbers = default if text is None else tuple(map(float, text.split()))
-    except ValueError:
-        numbers = ()
-    if len(numbers) != len(default) or not (np.isfinite(numbers) & (np.array(numbers) > minimum)).all():
-        problem = f'the model {path.name} has {key}="{text or ""}" in a <{element.tag}>'
-        limit = f" above {minimum:g}" if minimum > -math.inf else ""
-        raise InputError(f"{problem}; write {len(default)} finite number(s){limit}")
-    return numbers
-
-
-def find_arm_model_errors(arm: ArmFile) -> Iterator[tuple[KeyPath, str]]:
-    """Yield key and message for each error in the model of the arm: missing links, wrong joints."""
-    try:
-        path = find_model(arm.urdf)
-        robot = read_robot(path)
-        if not is_shipped(path):
-            check_files(path, robot, math.inf)
-    except InputError as error:
-        yield ("arm", "urdf"), str(error)
-        return
-    links = [link.get("name", "") for link in robot.findall("link")]
-    simulation = arm.simulation
-    named_links: list[tuple[KeyPath, str]] = [
-        (("flange", "link"), arm.flange.link),
-        (("simulation", "first_collision_link"), simulation.first_collision_link),
-        (("simulation", "wrist_link"), simulation.wrist_link),
-    ]
-    for index, pair in enumerate(simulation.self_collision_pairs):
-        key_path = ("simulation", "self_collision_pairs", index)
-        named_links += [(key_path, link) for link in pair if link != TOOL_LINK]
-    for keys, link in named_links:
-        if link not in links:
-            hint = suggest_choice(link, links, "Links of the model")
-            yield ("arm", *keys), f'the model {arm.urdf} of the arm {arm.arm} has no link "{link}". {hint}'
-    joints = {joint.findall("child")[0].get("link"): joint for joint in robot.findall("joint[parent][child]")}
-    joint_kinds = []
-    link_name: str | None = arm.flange.link
-    while (joint := joints.pop(link_name, None)) is not None:
-        joint_kinds.append(joint.get("type", ""))
-        link_name = joint.findall("parent")[0].get("link")
-    if arm.flange.link in links and joint_kinds != ["revolute"] * arm.joint_count:
-        kinds = ", ".join(reversed(joint_kinds)) or "none"
-        yield (
-            ("arm", "limits"),
-            f"the model {arm.urdf} must have {arm.joint_count} revolute joints up to the flange; "
-            f"it has: {kinds}",
-        )

@@ -212,9 +212,12 @@ def read_cell(path: Path) -> CellConfig:
     """
     try:
         content = load_yaml(read_source(path / "cell.yaml"))
-        # Earlier records contain only model, limits and poses of their arm, which was always the default arm.
-        default_arm = load_yaml(read_source(get_shipped_folder() / DEFAULT_ARM_FILE))
-        return CellConfig(**{**content, "arm": {**default_arm, **content["arm"]}})
+        # Earlier records contain only model, limits and poses of their arm, which was always the default arm,
+        # or a key that no longer exists.
+        is_old = "flange" not in content["arm"]
+        default_arm = load_yaml(read_source(get_shipped_folder() / DEFAULT_ARM_FILE)) if is_old else {}
+        arm = {key: value for key, value in {**default_arm, **content["arm"]}.items() if key != "simulation"}
+        return CellConfig(**{**content, "arm": arm})
     except ValidationError as error:
         texts = (each["msg"].removeprefix("Value error, ") for each in error.errors())
         keys = (".".join(map(str, each["loc"])) for each in error.errors())

@@ -7,7 +7,7 @@ import itertools
 import math
 import zlib
 from collections.abc import Callable, Collection
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -26,6 +26,9 @@ from executive.perception.camera_check import describe_displacement, describe_st
 from executive.perception.camera_model import BORDER_FRACTION, compute_calibration, compute_hull_mask
 from executive.perception.witness import find_unexplained
 
+if TYPE_CHECKING:
+    from executive.physics.arm_model import ArmHulls
+
 MAX_PIXELS = 10**8
 """Maximum number of pixels of a recorded image."""
 MAX_LOAD_OFFSET = 0.015
@@ -34,6 +37,13 @@ TOOL_SPHERE_RADIUS = 0.02
 """Radius of the spheres that enclose the tool with its cables and hoses [m]."""
 SPHERES_PER_SEGMENT = 9
 """Number of spheres that cover the segment between two points on the axis of a part of the arm."""
+
+
+def _load_hulls(config: CellConfig) -> ArmHulls:
+    # The import loads PyBullet in 0.2 s; a cell without physics does not need it.
+    from executive.physics.arm_model import ArmHulls
+
+    return ArmHulls(config.arm)
 
 
 class Robot(NamedTuple):
@@ -88,7 +98,7 @@ class CellCamera:
         # T is the frame of the tool, F the frame of the flange.
         self._X_TF = Pose.of((0.0, 0.0, -config.tool.length))
         self._size = (self.config.width, self.config.height)
-        self._link_radius = config.arm.simulation.link_radius
+        self._hulls = _load_hulls(config) if is_hidden_by_arm else None
         self._load_radius = max(section.radius for section in config.objects.values()) + MAX_LOAD_OFFSET
         self._load_height = config.max_hold_height
         heights = (0.0, config.max_pile_height)
@@ -189,20 +199,16 @@ class CellCamera:
         return self._kinematics.compute_tool_pose(q) @ self._X_TF @ self._X_MC
 
     def _compute_visibility_mask(self, robot: Robot, X_WC: Pose) -> NDArray[np.bool_]:
-        """Return the mask `(H, W)` of the pixels that no sphere around arm, tool or held object occludes."""
+        """Return the mask `(H, W)` of the pixels that no hull around arm, tool or held object occludes."""
         width, height = self._size
         occluded = np.zeros((height, width), dtype=np.uint8)
-        if not self._is_hidden_by_arm:
+        if self._hulls is None:
             return occluded == 0
         q = robot.arm.q
+        self._hulls.draw(occluded, q, self.matrix, X_WC)
         X_WT = self._kinematics.compute_tool_pose(q)
         X_WF = X_WT @ self._X_TF
-        joint_frames = self._kinematics.compute_joint_frames(q)
-        joints = [np.zeros(3), *(frame.position for frame in joint_frames), X_WF.position]
-        parts = [
-            (joints, self._link_radius),
-            ([X_WF.position, X_WT.position], TOOL_SPHERE_RADIUS),
-        ]
+        parts = [([X_WF.position, X_WT.position], TOOL_SPHERE_RADIUS)]
         if robot.tool.holding:
             load_end = X_WT.apply(np.array([0.0, 0.0, self._load_height]))
             parts.append(([X_WT.position, load_end], self._load_radius))
@@ -210,8 +216,7 @@ class CellCamera:
             for start, end in itertools.pairwise(points):
                 centres = X_WC.inverse().apply(np.linspace(start, end, SPHERES_PER_SEGMENT))
                 for x, y, z in (centres @ self.matrix.T).tolist():
-                    # A sphere behind the camera is invisible. The link that carries a wrist camera has a
-                    # sphere around the camera, which would occlude the whole image.
+                    # A sphere behind the camera is invisible.
                     if z <= radius:
                         continue
                     column = round(x / z)

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from executive.cell.config import CellConfig, ObjectConfig
 from executive.cell.devices import CameraImage, DriverKind, is_rehearsal, load_driver_kind
 from executive.cell.frame import Box
-from executive.geometry import Array, Pose
+from executive.geometry import GRAVITY, Array, Pose
 from executive.motion.joints import build_kinematics, find_arm_errors
-from executive.motion.planner import find_places_out_of_reach
+from executive.motion.reach import find_braking_errors, find_places_out_of_reach
 from executive.perception.camera_model import BORDER_FRACTION, compute_calibration, project
 from executive.perception.detectors.detector_registry import find_detectable_labels, find_detector_errors
 from executive.station.camera import CellCamera, Robot
@@ -46,10 +46,13 @@ class CellChecker:
             yield from arm_errors
             return
         yield from self.kind.check(config, cell_folder)
-        yield from find_places_out_of_reach(config)
+        reach_errors = tuple(find_places_out_of_reach(config))
+        yield from reach_errors
         if is_rehearsal(self.kind):
             yield from find_view_errors(config)
             return
+        if not reach_errors:
+            yield from find_braking_errors(config)
         yield from find_detector_errors(config.detectors, cell_folder)
         if config.localization == "ray" and not hasattr(self.kind, "cast_ray"):
             message = f'"ray" casts rays in a simulated world, which the driver "{config.kind}" does not have'
@@ -87,6 +90,8 @@ def load_checker(kind: str) -> CellChecker:
 
 POINTS_PER_SIDE = 9
 """Number of positions of the flattest object along each side of the workspace for the check of occlusion."""
+DIFFERENTIATION_STEP = 1e-5
+"""Step of a joint for the numerical derivative of the height of the tool [rad]."""
 MAX_KINEMATICS_ERROR = 1e-4
 """Maximum difference between the kinematics of the solver and of the model, in position [m] and rotation."""
 
@@ -100,8 +105,8 @@ def find_pose_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     errors are reported.
     """
     # The import loads PyBullet, which takes 0.2 s; a cell without physics does not need it.
+    from executive.physics.arm_model import find_arm_model_errors
     from executive.physics.collision import ClearanceChecker
-    from executive.physics.model_files import find_arm_model_errors
 
     if model_errors := tuple(find_arm_model_errors(config.arm)):
         yield from model_errors
@@ -115,7 +120,30 @@ def find_pose_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
                 margin = f"the minimum clearance is {config.motion.margin:.3f} m"
                 message = f'the pose "{name}" brings {violation}; {margin}'
                 yield ("arm", "poses_deg", name), message
+        yield from find_payload_errors(config, checker.world)
         yield from _find_occluding_poses_and_bins(config, checker.world)
+
+
+def find_payload_errors(config: CellConfig, world: CellWorld) -> Iterator[tuple[KeyPath, str]]:
+    """Yield key and message for each pose in which a joint cannot hold arm, tool and the heaviest class.
+
+    The torque of each joint is that of the weight of all links, of the tool, and of an object at the tool.
+    """
+    kinematics = build_kinematics(config)
+    mass = max((section.mass or 0.0 for section in config.objects.values()), default=0.0)
+    efforts = np.array(config.arm.effort)
+    for name, pose in config.arm.poses_deg.items():
+        q = np.radians(pose)
+        still = [0.0] * len(pose)
+        torques = np.array(world.client.calculateInverseDynamics(world.arm, q.tolist(), still, still))
+        steps = q + DIFFERENTIATION_STEP * np.eye(len(q))
+        heights = kinematics.compute_tcps_and_axes(np.vstack([q, steps]))[0][:, 2]
+        torques += mass * GRAVITY * (heights[1:] - heights[0]) / DIFFERENTIATION_STEP
+        joint = int(np.argmax(np.abs(torques) / efforts))
+        if abs(torques[joint]) > efforts[joint]:
+            needed = f"joint {joint + 1} needs {abs(torques[joint]):.1f} Nm to hold arm, tool and {mass:g} kg"
+            message = f'{needed} in the pose "{name}"; its effort is {efforts[joint]:g} Nm'
+            yield ("arm", "poses_deg", name), message
 
 
 def _describe_wrong_solver(config: CellConfig, world: CellWorld) -> str:
@@ -133,7 +161,7 @@ def _describe_wrong_solver(config: CellConfig, world: CellWorld) -> str:
     )
 
 
-class _StillRobot:
+class StillRobot:
     """An arm that stands in a pose, an empty tool, and a camera with black images."""
 
     holding = False
@@ -144,11 +172,12 @@ class _StillRobot:
         self._image = np.zeros((camera.height, camera.width, 3), np.uint8)
 
     def capture(self) -> CameraImage:
+        """Return a black image."""
         return CameraImage(self._image, None, 0.0)
 
 
 def _find_occluding_poses_and_bins(config: CellConfig, world: CellWorld) -> Iterator[tuple[KeyPath, str]]:
-    robot: Any = _StillRobot(config)
+    robot: Any = StillRobot(config)
     name = next(iter(config.cameras))
     build = build_kinematics(config)
     camera = CellCamera(config, robot, Robot(robot, robot), Robot(robot, robot), build)

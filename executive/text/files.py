@@ -31,6 +31,14 @@ def has_outside_link(folder: Path, path_text: str) -> bool:
     return not (folder / path_text).resolve().is_relative_to(folder.resolve())
 
 
+def describe_outside_path(folder: Path, path_text: str) -> str:
+    """Return a message if a path in a file in a folder leads out of the folder, otherwise ""."""
+    if is_outside_path(path_text):
+        return f'"{path_text}" must be a relative path without ".."'
+    is_link = has_outside_link(folder, path_text)
+    return f'"{path_text}" is a link to a file outside {folder}' if is_link else ""
+
+
 def get_shipped_folder() -> Path:
     """Return the folder of the shipped missions, in a wheel or in a checkout."""
     package = Path(executive.__file__).parent

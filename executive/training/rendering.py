@@ -36,8 +36,9 @@ from executive.drivers.sim.scene import DECLARED_SCENE, SceneConfig, build_world
 from executive.drivers.sim.spawn import spawn_objects
 from executive.drivers.sim.world import WOOD_TEXTURE
 from executive.errors import InputError
+from executive.motion.joints import build_kinematics
 from executive.perception.camera_model import compute_calibration, intersect_plane, project
-from executive.physics.model_files import find_arm_model_errors
+from executive.physics.arm_model import find_arm_model_errors
 from executive.processes import WorkerPool
 from executive.training import dataset
 from executive.training.dataset import DatasetEntry, LabelledImage
@@ -180,6 +181,7 @@ class SceneRenderer:
         self._camera_name, self._nominal_camera = next(iter(config.cameras.items()))
         self._world = build_world(config, scene or DECLARED_SCENE)
         self._config = self._world.config
+        self._kinematics = build_kinematics(self._config)
         self._camera = self._config.cameras[self._camera_name]
         self._camera_matrix, _ = compute_calibration(self._camera)
 
@@ -224,7 +226,7 @@ class SceneRenderer:
     def _render_random(self, rng: np.random.Generator) -> LabelledImage | None:
         """Return the image of a random scene, or None if too many objects are heavily occluded."""
         world = self._world
-        is_holding = arrangements.move_arm_randomly(world, self._camera, rng)
+        is_holding = arrangements.move_arm_randomly(world, self._kinematics, self._camera, rng)
         matrix = self._camera_matrix
         X_WC = get_camera_pose(world, self._camera)
         colour = (1.0, 1.0, 1.0)

@@ -6,6 +6,7 @@ The ranges are larger than the variation in scenes of missions.
 from __future__ import annotations
 
 import colorsys
+import contextlib
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,6 +15,7 @@ import cv2
 import numpy as np
 from numpy.random import Generator
 
+from executive.cell.arm import Goal
 from executive.cell.config import CellConfig, ObjectConfig
 from executive.cell.device_config import CameraConfig, Colour, NoiseConfig, Range
 from executive.cell.devices import TrueObject
@@ -30,7 +32,10 @@ from executive.drivers.sim.models import (
     scale_model,
 )
 from executive.drivers.sim.world import PLAIN_TEXTURE, TEXTURES, WOOD_TEXTURE, World
-from executive.geometry import Array, Pose, make_tool_down_pose, rotate_about_z
+from executive.errors import Unreachable
+from executive.geometry import Array, Pose, rotate_about_z
+from executive.motion.configurations import find_configuration_pairs
+from executive.motion.joints import Kinematics
 from executive.perception.camera_model import intersect_plane
 from executive.physics.cell_world import add_bin
 
@@ -171,9 +176,11 @@ TABLE_Y_RANGE = (-0.71, 0.71)
 """Range of the y coordinates of objects on the table top [m]."""
 MIN_BASE_DISTANCE = 0.16
 """Minimum distance of an object from the axis of the base of the arm [m]."""
+MAX_POSE_ATTEMPTS = 20
+"""Maximum number of random places of the tool until the arm can reach one."""
 
 
-def move_arm_randomly(world: World, camera: CameraConfig, rng: Generator) -> bool:
+def move_arm_randomly(world: World, kinematics: Kinematics, camera: CameraConfig, rng: Generator) -> bool:
     """Move the arm to a random pose of a run, and return True if the tool shall hold an object."""
     poses = camera.scan_poses
     pose = poses[0] if rng.random() < 0.6 else str(rng.choice(poses))
@@ -186,15 +193,22 @@ def move_arm_randomly(world: World, camera: CameraConfig, rng: Generator) -> boo
         offset = rng.uniform(-1, 1, 3) * max_offset
         tilt = Pose.of(np.zeros(3), [*rng.normal(0, math.radians(1.5), 2) / 2, 0, 1])
         rotation = rotate_about_z(rng.uniform(-max_angle, max_angle)) @ X_WT.rotation
-        _move_tool(world, Pose(rotation, X_WT.position + offset) @ tilt)
+        q = world.get_joint_positions()
+        with contextlib.suppress(Unreachable):
+            X_WT = Pose(rotation, X_WT.position + offset) @ tilt
+            (q,) = kinematics.solve([X_WT], kinematics.find_branch(q))
+        if kinematics.joint_range.contains(q):
+            world.set_joint_positions(q)
         return bool(rng.random() < 0.08)
     if is_near_scan_pose:
         return False
-    # The inverse kinematics starts from a pose that is closer to all targets than the scan poses.
-    position = rng.uniform((0.25, -0.50, 0.05), (0.72, 0.50, 0.40))
-    azimuth = math.atan2(position[1], position[0])
-    world.set_joint_positions([azimuth, *map(math.radians, world.config.arm.simulation.sampling_pose_deg)])
-    _move_tool(world, make_tool_down_pose(position, azimuth + rng.uniform(-1.2, 1.2)))
+    for _ in range(MAX_POSE_ATTEMPTS):
+        x, y, z = rng.uniform((0.25, -0.50, 0.05), (0.72, 0.50, 0.40)).tolist()
+        goal = Goal((x, y, z), yaws=(math.atan2(y, x) + rng.uniform(-1.2, 1.2),))
+        with contextlib.suppress(Unreachable):
+            qs = find_configuration_pairs(kinematics, goal, 0.0, world.get_joint_positions()).lower_qs
+            world.set_joint_positions(qs[int(rng.integers(len(qs)))])
+            break
     return bool(rng.random() < 0.3)
 
 
@@ -261,7 +275,8 @@ def draw_arrangement(
     random_number = rng.random()
     if random_number < 0.15:
         return simulate_fall(config, _draw_heap(objects[:MAX_SPARSE_OBJECT_COUNT], low, high, bins, rng))
-    objects = _place_side_by_side(objects, low, high, bins, all_bins, rng)
+    base = np.array(config.arm.base.position[:2])
+    objects = _place_side_by_side(objects, low, high, bins, all_bins, base, rng)
     if random_number < 0.23:
         drop_offset = np.array([0, 0, 0.04])
         raised = [replace(o, X_WO=Pose(_draw_rotation(rng), o.position + drop_offset)) for o in objects]
@@ -294,18 +309,6 @@ def simulate_fall(config: CellConfig, objects: Sequence[TrueObject]) -> list[Tru
         return [replace(item, X_WO=locate_object(client, body, get_model(item))) for body, item in pairs]
     finally:
         client.disconnect()
-
-
-def _move_tool(world: World, X_WT: Pose) -> None:
-    """Move the tool near `X_WT`; the accuracy is unimportant, because labels use the actual camera pose."""
-    tool_offset = world.config.arm.flange.offset + world.config.tool.length
-    X_WL = X_WT @ Pose.of([0, 0, -tool_offset])
-    for _ in range(3):  # X_WL is the pose of the flange link
-        q = world.client.calculateInverseKinematics(
-            world.arm, world.flange_index, X_WL.position, X_WL.quaternion,
-            maxNumIterations=60, residualThreshold=1e-4,
-        )  # fmt: skip
-        world.set_joint_positions(q[: len(world.joints)])
 
 
 def _draw_rotation(rng: Generator) -> Array:
@@ -352,7 +355,13 @@ def _stack_randomly(objects: list[TrueObject], rng: Generator) -> None:
 
 
 def _place_side_by_side(
-    objects: list[TrueObject], low: Array, high: Array, bins: list[Bin], all_bins: list[Bin], rng: Generator
+    objects: list[TrueObject],
+    low: Array,
+    high: Array,
+    bins: list[Bin],
+    all_bins: list[Bin],
+    base: Array,
+    rng: Generator,
 ) -> list[TrueObject]:
     """Return objects at random free positions on the table or in `bins`; objects without room are omitted."""
     gap = rng.uniform(0.0, 0.02)
@@ -375,7 +384,7 @@ def _place_side_by_side(
                 np.linalg.norm(item.position[:2] - point) > radius + get_model(item).radius + gap
                 for item in placed_objects
             )
-            if is_free and np.linalg.norm(point) > MIN_BASE_DISTANCE:
+            if is_free and np.linalg.norm(point - base) > MIN_BASE_DISTANCE:
                 position = np.array([*point, floor_height - load_mesh(get_model(candidate)).bottom])
                 X_WO = Pose(rotate_about_z(rng.uniform(0, math.tau)), position)
                 placed_objects.append(replace(candidate, X_WO=X_WO))

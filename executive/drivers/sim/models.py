@@ -18,13 +18,13 @@ import pybullet
 from numpy.typing import NDArray
 from pybullet_utils.bullet_client import BulletClient
 
+from executive.arms.urdf import find_model, make_rotation, parse_numbers
 from executive.cell.config import CellConfig, ObjectConfig
 from executive.cell.device_config import STEP
 from executive.cell.frame import Box
 from executive.errors import InputError
 from executive.geometry import Array, Pose
 from executive.physics import model_files
-from executive.physics.model_files import find_model, make_rotation
 from executive.processes import build_command
 from executive.text.validate import KeyPath
 
@@ -148,7 +148,7 @@ def compute_mass(config: ObjectConfig) -> float:
         return config.mass or DEFAULT_MESH_MASS
     path = find_model(config.urdf)
     masses = model_files.read_urdf(path).iterfind(".//inertial/mass")
-    mass = sum(sum(model_files.parse_numbers(path, mass, "value", (0.0,))) for mass in masses)
+    mass = sum(sum(parse_numbers(path, mass, "value", (0.0,))) for mass in masses)
     if config.mass is not None:
         return config.mass
     if not MIN_MASS <= mass <= MAX_MASS:

@@ -13,7 +13,7 @@ from executive.cell.tools import ToolModel
 from executive.drivers import world_log
 from executive.drivers.sim.world import World
 from executive.geometry import Array, Pose
-from executive.physics.cell_world import POSITION_A
+from executive.physics.cell_world import NORMAL, NORMAL_FORCE, POSITION_A
 
 FindGrip = Callable[[Collection[int]], tuple[int, float] | None]
 """Function that returns the body among the bodies within reach that the tool can grip, and the force with
@@ -21,6 +21,9 @@ which the tool holds the body [N]; None if the tool can grip none of them."""
 PULL_SMOOTHING = 0.25
 """Weight of the newest step in the low-pass filter of the pull on the grip. The time constant of 14 ms (3.5
 steps) suppresses impact forces of the solver, which last a single step, and is short enough for a grip."""
+
+MIN_SUPPORT_COSINE = 0.7
+"""Minimum cosine between the vertical and the direction of a contact force that supports a body."""
 
 
 @dataclass
@@ -133,6 +136,11 @@ class SimTool:
         """Update the grip after a physics step."""
         if (grip := self._grip) is not None:
             force = np.array(self._world.client.getConstraintState(grip.constraint)[:3])
+            # While the body lies on a support, the rigid constraint shows the tracking error of the arm,
+            # which the compliance of a real tool absorbs.
+            contacts = self._world.client.getContactPoints(bodyA=grip.body) or ()
+            if any(p[NORMAL][2] > MIN_SUPPORT_COSINE and p[NORMAL_FORCE] > 0 for p in contacts):
+                force = np.zeros(3)
             grip.pull += PULL_SMOOTHING * (force - grip.pull)
             if self.pull > grip.force:
                 self.lose_grip()

@@ -1,6 +1,6 @@
 """PyBullet world of a cell: arm with tool, table, bins and loose objects, and their shapes for display.
 
-The origin of the world frame W is at the base of the arm, on the table top. Worlds with equal cell files and
+The origin of the world frame W is on the table top. Worlds with equal cell files and
 equal objects in equal order are bitwise identical.
 """
 

@@ -41,6 +41,8 @@ MEASUREMENT_SUFFIX = ".measured.json"
 """Suffix of a measurement file, after the name of the cell."""
 MAX_FILE_SIZE = 1_000_000
 """Maximum size of a measurement file [byte]."""
+DEFAULT_ARM_PLACE = "iiwa14 at [0.0, 0.0, 0.0], 0 degrees"
+"""Arm of measurements that name none: the one in the images with which the shipped detectors were trained."""
 MEASUREMENT_MINUTES = 2
 """Typical duration of a measurement on two cores [min]."""
 
@@ -230,9 +232,10 @@ def compute_fingerprint(config: CellConfig, detector: str, base: Path) -> Mappin
     """Return the fingerprint of a detector in its cell.
 
     The fingerprint contains weights and settings of the detector, the localization method, the classes and
-    their sizes, and pose, intrinsics, image size, `table_view` and depth settings of the camera. It does not
-    contain bins, the number of objects, light, colours, and classes that look like another class. Paths in
-    the cell file are relative to `base`.
+    their sizes, and pose, intrinsics, image size, `table_view` and depth settings of the camera. It contains
+    an arm other than the one in the training images, or at another place. It does not contain bins, the
+    number of objects, light, colours, and classes that look like another class. Paths in the cell file are
+    relative to `base`.
     """
     section = config.detectors[detector]
     options = {key: value for key, value in section.options.items() if key != "threads"}
@@ -241,6 +244,7 @@ def compute_fingerprint(config: CellConfig, detector: str, base: Path) -> Mappin
     camera = next(iter(config.cameras.values()))
     matrix, X_MC = compute_calibration(camera)
     poses = {name: config.arm.poses_deg[name] for name in camera.scan_poses if camera.mount == "wrist"}
+    place = f"{config.arm.arm} at {list(config.arm.base.position)}, {config.arm.base.yaw_deg:g} degrees"
     return {
         "detector": f"{section.kind} {json.dumps(options, sort_keys=True)}",
         "weights": _digest(weights) if weights and weights.is_file() else "",
@@ -255,6 +259,7 @@ def compute_fingerprint(config: CellConfig, detector: str, base: Path) -> Mappin
         "camera lens": f"{matrix.round(2).tolist()}",
         "camera image": f"{camera.width} x {camera.height}, searched {list(camera.table_view)}",
         "camera depth": "" if camera.depth is None else camera.depth.model_dump_json(),
+        **({} if place == DEFAULT_ARM_PLACE else {"arm": place}),
     }
 
 

@@ -1,0 +1,305 @@
+"""Arm of a URDF for PyBullet: its model with the tool, the hulls of its links, and errors in its model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
+from pathlib import Path
+from string import Template
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+from xml.sax.saxutils import escape
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from executive.arms.urdf import (
+    JointChain,
+    describe_place,
+    find_model,
+    locate_flange,
+    parse_numbers,
+    read_chain,
+    read_origin,
+    read_robot,
+)
+from executive.cell.arm_config import TOOL_LINK, ArmConfig, ArmFile, FlangeConfig
+from executive.cell.config import CellConfig
+from executive.errors import InputError
+from executive.geometry import Array, Pose, rotate_about_z
+from executive.physics.model_files import check_files, convert_model, find_mesh, is_shipped, read_mesh
+from executive.text.findings import suggest_choice
+from executive.text.validate import KeyPath
+
+CYLINDER_MARGIN = 0.001
+"""Collision margin that Bullet adds on all sides to a cylinder of a URDF [m]."""
+TOOL_MASS = 0.1
+"""Mass of the tool [kg]."""
+MAX_ARM_TRIANGLE_COUNT = 200_000
+"""Maximum number of triangles of a mesh of an arm: the largest visual mesh of a UR5e has 42,000."""
+MIN_LINK_MASS = 1e-3
+"""Mass of a link without a mass [kg]; PyBullet would assume 1 kg."""
+MAX_HULL_SIZE = 3.0
+"""Maximum distance of a point of a link from the origin of the link [m]; a larger mesh is in millimetres."""
+MAX_LINK_MASS = 1000.0
+"""Maximum mass of a link [kg]."""
+MAX_SHAPE_COUNT = 1000
+"""Maximum number of collision shapes of an arm: the check of 2,000 shapes takes 4 s."""
+NUMBER_COUNTS = {
+    **dict.fromkeys(("xyz", "rpy"), 3),
+    **dict.fromkeys(("value", "ixx", "iyy", "izz", "ixy", "ixz", "iyz", "damping", "friction"), 1),
+}
+"""Number of the numbers in the attributes of a link or joint that PyBullet reads, except those of shapes."""
+HULL_MARGIN = 0.01
+"""Distance between a link and its hull [m], for cables, hoses and the error of the camera pose."""
+DIRECTION_COUNT = 240
+"""Number of directions in which a hull touches its link."""
+MIN_DEPTH = 0.05
+"""Minimum distance of a visible point of the arm from the camera along the optical axis [m]; the link that
+carries a wrist camera is nearer."""
+
+
+def build_arm_urdf(config: CellConfig, *, visuals: bool) -> str:
+    """Return the URDF of the arm of a cell, with the tool as an additional fixed link.
+
+    A fixed link has no drift, in contrast to a constraint between two bodies. The URDF contains the links
+    that belong to the arm, absolute names of meshes that PyBullet can read, and an inertia for every link.
+    """
+    arm = config.arm
+    path = find_model(arm.urdf)
+    robot = read_robot(path)
+    chain = read_chain(arm.urdf, arm.flange)
+    result = Element("robot", name=arm.arm)
+    for element in _list_parts(robot, chain):
+        is_link = element.tag == "link"
+        result.append(_complete_link(path, element, visuals=visuals) if is_link else element)
+    for mesh in result.iter("mesh"):
+        file = find_mesh(path, mesh)
+        # PyBullet reads the STL files of pybullet_data; the conversion would import trimesh.
+        name = str(file) if is_shipped(file) else convert_model(file, MAX_ARM_TRIANGLE_COUNT)
+        mesh.set("filename", name)
+    for texture in result.iter("texture"):
+        texture.set("filename", str(find_mesh(path, texture)))
+    for number, material in enumerate(result.iter("material")):
+        material.set("name", material.get("name", f"material_{number}"))  # PyBullet needs a name.
+    ElementTree.indent(result)  # PyBullet cannot read long lines.
+    text = ElementTree.tostring(result, encoding="unicode")
+    return text.removesuffix("</robot>") + _build_tool_urdf(config)
+
+
+def _list_parts(robot: Element, chain: JointChain) -> list[Element]:
+    """Return the links, joints and materials of a URDF that belong to the arm."""
+    parts = robot.findall("material")
+    for element in robot:
+        child = element.find("child") if element.tag == "joint" else None
+        name = element.get("name") if element.tag == "link" else child is not None and child.get("link")
+        if name in chain.places:
+            parts.append(element)
+    return parts
+
+
+def _complete_link(path: Path, link: Element, *, visuals: bool) -> Element:
+    """Return a link with an inertia, and without visual shapes unless `visuals` is True."""
+    result = Element("link", name=link.get("name", ""))
+    left_out = ("inertial",) if visuals else ("inertial", "visual")
+    result.extend(child for child in link if child.tag not in left_out)
+    inertial = link.find("inertial")
+    mass = link.find("inertial/mass")
+    inertia = link.find("inertial/inertia")
+    value = 0.0 if mass is None else parse_numbers(path, mass, "value", (0.0,))[0]
+    moment = str(MIN_LINK_MASS * max(1.0, value / MIN_LINK_MASS) * 1e-3)
+    axes = {"ixx": moment, "iyy": moment, "izz": moment, "ixy": "0", "ixz": "0", "iyz": "0"}
+    if inertial is None or inertia is None or axes.keys() - inertia.attrib.keys() or value <= 0:
+        inertial = Element("inertial")
+        ElementTree.SubElement(inertial, "mass", value=str(max(value, MIN_LINK_MASS)))
+        ElementTree.SubElement(inertial, "inertia", axes)
+    result.insert(0, inertial)
+    return result
+
+
+def _build_tool_urdf(config: CellConfig) -> str:
+    """Return the end of a URDF: link and joint of the tool."""
+    tool = config.tool
+    flange = config.arm.flange
+    text_of_tool, text_of_part = Path(__file__).with_name("tool.urdf").read_text().split("</robot>\n")
+    part_template = Template(text_of_part)
+    parts = "".join(
+        part_template.substitute(
+            centre=tool.length - part.offset - part.length / 2,
+            length=part.length,
+            radius=part.radius,
+            collision_length=part.length - 2 * CYLINDER_MARGIN,
+            collision_radius=part.radius - CYLINDER_MARGIN,
+        )
+        for part in tool.parts
+    )
+    values: dict[str, object] = {
+        "flange_link": escape(flange.link, {'"': "&quot;"}),
+        "xyz": " ".join(map(str, locate_flange(flange).position)),
+        "rpy": " ".join(map(str, np.radians(flange.rotation_deg))),
+        "centre": tool.length / 2,
+        "mass": TOOL_MASS,
+        "parts": parts,
+    }
+    return Template(text_of_tool).substitute(values) + "</robot>"
+
+
+class ArmHulls:
+    """Hulls of the links of an arm in the world and in images.
+
+    Args:
+        arm: The arm of a cell.
+    """
+
+    def __init__(self, arm: ArmConfig) -> None:
+        self._chain = read_chain(arm.urdf, arm.flange)
+        self._X_WB = Pose(rotate_about_z(math.radians(arm.base.yaw_deg)), np.array(arm.base.position))
+        self._points_by_link = read_hulls(arm.urdf, arm.flange)
+
+    def compute_points(self, q: Array) -> list[Array]:
+        """Return the corners `(N, 3)` [m] of the hull of each link in the world at `q` `(n,)` [rad]."""
+        frames = self._chain.compute_frames(q)
+        points_by_link = []
+        for link, points in self._points_by_link.items():
+            count, X_JL = self._chain.places[link]
+            points_by_link.append((self._X_WB @ frames[count] @ X_JL).apply(points))
+        return points_by_link
+
+    def draw(self, mask: NDArray[np.uint8], q: Array, matrix: Array, X_WC: Pose) -> None:
+        """Set the pixels of an image mask `(H, W)` that the links hide at `q` `(n,)` [rad].
+
+        `matrix` is the camera matrix `(3, 3)` [pixel].
+        """
+        max_coordinate = 4 * max(mask.shape)  # OpenCV cannot draw polygons with very large coordinates.
+        X_CW = X_WC.inverse()
+        for points in self.compute_points(q):
+            x, y, depth = matrix @ X_CW.apply(points).T
+            is_in_front = depth > MIN_DEPTH
+            pixels = np.stack([x, y], axis=1)[is_in_front] / depth[is_in_front, None]
+            if len(pixels) > 2:
+                corners = pixels.clip(-max_coordinate, max_coordinate).round().astype(np.int32)
+                cv2.fillConvexPoly(mask, cv2.convexHull(corners), 1)
+
+
+@lru_cache(maxsize=8)
+def read_hulls(urdf: str, flange: FlangeConfig) -> Mapping[str, Array]:
+    """Return the corners `(N, 3)` [m] of a hull `HULL_MARGIN` around each link, in the frame of the link.
+
+    Raises:
+        InputError: A collision shape is invalid.
+    """
+    path = find_model(urdf)
+    places = read_chain(urdf, flange).places
+    directions = _spread_directions(DIRECTION_COUNT)
+    hulls: dict[str, Array] = {}
+    for link in read_robot(path).findall("link"):
+        name = link.get("name", "")
+        if name not in places:
+            continue
+        shapes = [
+            read_origin(path, element).apply(
+                _find_extreme_points(path, shape, read_origin(path, element), directions)
+            )
+            for element in link.findall("collision")
+            for shape in element.iterfind("geometry/*")
+        ]
+        if shapes:
+            points = np.array(shapes)  # (S, N, 3): for each of S shapes, a point for each of N directions
+            farthest = (points * directions).sum(axis=2).argmax(axis=0)
+            corners = points[farthest, range(len(directions))]
+            size = float(np.abs(corners).max())
+            if size > MAX_HULL_SIZE:
+                advice = 'lengths are in metres; add scale="0.001 0.001 0.001" to a mesh in millimetres'
+                raise InputError(f'the link "{name}" of the model {path.name} is {size:.3g} m long: {advice}')
+            hulls[name] = corners + HULL_MARGIN * directions
+    return hulls
+
+
+def _spread_directions(count: int) -> Array:
+    """Return unit vectors `(count, 3)`, evenly spread on a Fibonacci spiral."""
+    z = 1.0 - (2.0 * np.arange(count) + 1.0) / count
+    angles = np.arange(count) * math.pi * (3.0 - math.sqrt(5.0))
+    radius = np.sqrt(1.0 - z**2)
+    return np.stack([radius * np.cos(angles), radius * np.sin(angles), z], axis=1)
+
+
+def _find_extreme_points(path: Path, shape: Element, X_LS: Pose, directions: Array) -> Array:
+    """Return the farthest point of a shape in each of `N` directions in the link's frame, `(N, 3)` [m]."""
+    d = directions @ X_LS.rotation
+    if shape.tag == "mesh":
+        vertices, _ = read_mesh(find_mesh(path, shape), MAX_ARM_TRIANGLE_COUNT)
+        vertices = vertices * parse_numbers(path, shape, "scale", (1.0, 1.0, 1.0), 0.0)
+        return np.asarray(vertices[(vertices @ d.T).argmax(axis=0)])
+    if shape.tag == "box":
+        return np.sign(d) * np.array(parse_numbers(path, shape, "size", (0.0, 0.0, 0.0), 0.0)) / 2
+    if shape.tag not in ("cylinder", "sphere", "capsule"):
+        problem = f"{describe_place(path, shape)} has the geometry <{shape.tag}>"
+        raise InputError(f"{problem}; possible are box, cylinder, sphere, capsule and mesh")
+    (radius,) = parse_numbers(path, shape, "radius", (0.0,), 0.0)
+    length = 0.0
+    if shape.tag != "sphere":
+        (length,) = parse_numbers(path, shape, "length", (0.0,), 0.0)
+    ends = np.sign(d[:, 2:]) * [0.0, 0.0, length / 2]
+    if shape.tag == "cylinder":
+        flat = d * [1.0, 1.0, 0.0]
+        d = flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-9)
+    return np.asarray(radius * d + ends)
+
+
+def _check_parts(path: Path, robot: Element) -> None:
+    """Check the files, numbers and shapes of the parts of an arm.
+
+    Raises:
+        InputError: PyBullet cannot read a part, or would need too much time.
+    """
+    check_files(path, robot, MAX_ARM_TRIANGLE_COUNT)
+    if (count := len(robot.findall("link/collision"))) > MAX_SHAPE_COUNT:
+        raise InputError(f"the arm in {path.name} has {count} <collision>; write at most {MAX_SHAPE_COUNT}")
+    for element in robot.iter():
+        for key in NUMBER_COUNTS.keys() & element.attrib.keys():
+            numbers = parse_numbers(path, element, key, (0.0,) * NUMBER_COUNTS[key])
+            if element.tag == "mass" and not 0 <= numbers[0] <= MAX_LINK_MASS:
+                problem = f"{describe_place(path, element)} has a mass of {numbers[0]:g} kg"
+                raise InputError(f"{problem}; allowed are 0 to {MAX_LINK_MASS:g} kg")
+        if element.tag in ("visual", "collision"):
+            shapes = element.findall("geometry/*")
+            if len(shapes) != 1:
+                problem = f"{describe_place(path, element)} has {len(shapes)} shapes in a <{element.tag}>"
+                raise InputError(f"{problem}; write one <geometry> with one shape")
+            _find_extreme_points(path, shapes[0], Pose.identity(), _spread_directions(1))
+
+
+def find_arm_model_errors(arm: ArmFile) -> Iterator[tuple[KeyPath, str]]:
+    """Yield key and message for each error in the model of the arm: links, joints, masses and meshes."""
+    try:
+        path = find_model(arm.urdf)
+        chain = read_chain(arm.urdf, arm.flange)
+        robot = read_robot(path)
+        robot[:] = _list_parts(robot, chain)
+        if not is_shipped(path):
+            _check_parts(path, robot)
+        hulls = read_hulls(arm.urdf, arm.flange)
+    except InputError as error:
+        yield ("arm", "urdf"), str(error)
+        return
+    if TOOL_LINK in chain.places:
+        yield (
+            ("arm", "urdf"),
+            f'the model {path.name} has a link "{TOOL_LINK}", the name of the tool; rename it',
+        )
+    if len(chain.joints) != arm.joint_count:
+        joints = f"{len(chain.joints)} joints up to the flange: {', '.join(chain.joints)}"
+        message = f"the model {path.name} has {joints}; the limits are for {arm.joint_count} joints"
+        yield ("arm", "limits"), message
+    moving = {name for name, (count, _) in chain.places.items() if count > 1}
+    if not moving & hulls.keys():
+        message = f"the model {path.name} has no <collision> after its first joint; it would touch nothing"
+        yield ("arm", "urdf"), message
+    for index, pair in enumerate(arm.self_collision_pairs or ()):
+        for link in pair:
+            if link not in (*chain.places, TOOL_LINK):
+                hint = suggest_choice(link, [*chain.places], "Links of the arm")
+                keys = ("arm", "self_collision_pairs", index)
+                yield keys, f'the model {path.name} of the arm {arm.arm} has no link "{link}". {hint}'
