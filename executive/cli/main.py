@@ -33,6 +33,7 @@ COMMANDS: Mapping[str, str] = {
     "faults": "sweep",
     "replay": "run",
     "report": "run",
+    "arm": "arm",
     "doctor": "setup",
     "init": "setup",
 }

@@ -10,16 +10,21 @@ import os
 import platform
 import re
 import shlex
+import shutil
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from importlib.util import find_spec
 from pathlib import Path, PurePosixPath
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
 from executive.cli import shared
 from executive.errors import ExitCode, InputError, explain_os_errors
+
+if TYPE_CHECKING:
+    from executive.cell.arm_config import ArmFile
+    from executive.station.arm_report import ArmReport
 
 TEMPLATE = Path(__file__).parent / "template"
 """Folder with the template of every file of a project."""
@@ -95,7 +100,7 @@ def check_packages() -> Iterator[CheckResult]:
     if len(opencv_packages) > 1:
         fix = "uninstall them, then install opencv-python-headless"
         yield CheckResult("problem", "opencv", f"{' and '.join(opencv_packages)} overwrite each other; {fix}")
-    for extra in ("", "view", "cluster", "train"):
+    for extra in ("", "arms", "view", "cluster", "train"):
         names = list_requirements(extra) or (DISTRIBUTION,)
         if missing := ", ".join(name for name in names if not find_version(name)):
             # The guides install the extra `view`.
@@ -131,8 +136,33 @@ def check_simulator() -> Iterator[CheckResult]:
     yield CheckResult("ok", "simulator", "loads the cell overhead")
 
 
-def write_project(folder: Path, package: str) -> list[str]:
+LAYOUTS: tuple[Mapping[str, Any], ...] = (
+    {
+        "table": {"x": [0.42, 0.64], "y": [-0.22, 0.22], "objects": [4, 5]},
+        "bin_x": 0.24,
+        "bin_y": 0.48,
+        "bin_size": [0.24, 0.30, 0.06],
+    },
+    {
+        "table": {"x": [0.42, 0.62], "y": [-0.13, 0.13], "objects": [3, 4]},
+        "bin_x": 0.30,
+        "bin_y": 0.31,
+        "bin_size": [0.20, 0.26, 0.06],
+    },
+)
+"""Workspace and bins of a new project; the second layout is for small arms."""
+
+
+def write_project(
+    folder: Path, package: str, layout: Mapping[str, Any] = LAYOUTS[0], arm: Mapping[str, str] | None = None
+) -> list[str]:
     """Create a project in an empty or new folder; return the file paths, relative to the folder.
+
+    Args:
+        folder: The folder.
+        package: Name of the Python package.
+        layout: Workspace and bins of the cell.
+        arm: Name and sections of the arm in the cell file; None: the arm of the base.
 
     Raises:
         InputError: The folder is not empty, is a file, or cannot be written.
@@ -153,13 +183,90 @@ def write_project(folder: Path, package: str) -> list[str]:
     for template in sorted(TEMPLATE.rglob(f"*{SUFFIX}")):
         parts = template.relative_to(TEMPLATE).with_suffix("").parts
         name = PurePosixPath(*(package if part == PACKAGE else part for part in parts))
-        text = templates.from_string(template.read_text(encoding="utf-8")).render(name=package)
+        text = templates.from_string(template.read_text(encoding="utf-8")).render(
+            name=package, arm=arm, **layout
+        )
         path = folder / name
         with explain_os_errors(InputError, f"{path} cannot be written", "name a writable folder"):
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text, encoding="utf-8")
         names.append(str(name))
     return names
+
+
+def _write_project_with_arm(folder: Path, package: str, urdf: str, flange: str) -> list[str]:
+    """Create a project whose cell has the arm of a URDF; return the file paths, relative to the folder.
+
+    Raises:
+        InputError: The executive cannot move the arm, or the project cannot be written.
+    """
+    import yaml
+
+    from executive.arms.urdf import PACKAGE_PREFIX, find_model
+    from executive.cli.arm import dump_yaml, read_arm
+    from executive.motion.reach import find_fitting_speed
+    from executive.physics.model_files import list_model_files
+
+    arm, text = read_arm(urdf, flange)
+    layout, report = _choose_layout(arm)
+    sections: dict[str, Any] = {
+        "arm": {
+            "file": f"arms/{arm.arm}.yaml",
+            "base": {"position": [*report.config.arm.base.position]},
+            # The cell also looks from `aside`.
+            "poses_deg": {"aside": report.poses_deg["home"], **report.poses_deg},
+        },
+        "motion": {"descent_speed": find_fitting_speed(report.config)},
+    }
+    files = write_project(folder, package, layout, {"name": arm.arm, "sections": dump_yaml(sections)})
+    arms = folder / "cells" / "arms"
+    with explain_os_errors(InputError, f"{arms} cannot be written", "name a writable folder"):
+        arms.mkdir(parents=True)
+        if not urdf.startswith(PACKAGE_PREFIX):
+            model = find_model(arm.urdf)
+            model_files = list_model_files(model)
+            root = Path(os.path.commonpath([file.parent for file in model_files]))
+            for file in model_files:
+                copy = arms / root.name / file.relative_to(root)
+                copy.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(file, copy)
+            files.append(f"cells/arms/{root.name} ({len(model_files)} files)")
+            content = yaml.safe_load(text)
+            text = dump_yaml(
+                {**content, "urdf": str(PurePosixPath(root.name, *model.relative_to(root).parts))}
+            )
+        (arms / f"{arm.arm}.yaml").write_text(text, encoding="utf-8")
+    return [*files, f"cells/arms/{arm.arm}.yaml"]
+
+
+def _choose_layout(arm: ArmFile) -> tuple[Mapping[str, Any], ArmReport]:
+    """Return the first layout of which an arm reaches everything, and the report about the arm there.
+
+    Raises:
+        InputError: The arm reaches no layout, or has another problem there.
+    """
+    from executive.cell.config import BinConfig, TableConfig
+    from executive.mission.cell_file import load_cell
+    from executive.station.arm_report import place_arm, report_arm
+    from executive.text.files import find_cell
+
+    cell = load_cell(find_cell("overhead"))
+    for layout in LAYOUTS:
+        y = layout["bin_y"]
+        bins = {
+            name: BinConfig(position=(layout["bin_x"], sign * y, 0.0), size=layout["bin_size"])
+            for name, sign in {"block_bin": -1, "duck_bin": 1}.items()
+        }
+        config = cell.model_copy(update={"table": TableConfig(**layout["table"]), "bins": bins})
+        first_report = report_arm(place_arm(config, arm))
+        base = (*first_report.reach.best_base.round(3).tolist(), 0.0)
+        report = report_arm(place_arm(config, arm, base))
+        if min(report.reach.fractions.values()) == 1 and not report.problems:
+            return layout, report
+    missing = [f"{1 - value:.0%} of {name}" for name, value in report.reach.fractions.items() if value < 1]
+    problem = f"it does not reach {', '.join(missing)}" if missing else report.problems[0]
+    advice = "start with `executive init` without --urdf, and change table, bins and arm in its cell"
+    raise InputError(f"the arm {arm.arm} cannot work in the cell of a new project: {problem}; {advice}")
 
 
 def make_package_name(folder: Path) -> str:
@@ -206,14 +313,21 @@ def _find_conflict(name: str) -> str:
 @click.command(name="init")
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 @click.option("--name", help="Name of the Python package; by default derived from the name of DIR.")
-def init_command(folder: Path, name: str | None) -> None:
+@click.option("--urdf", default="", help="URDF of the arm of the project; by default, the arm is an iiwa.")
+@click.option("--flange", default="", help="Link of the URDF at the flange; by default, one is proposed.")
+def init_command(folder: Path, name: str | None, urdf: str, flange: str) -> None:
     """Create a project with a mission, a cell and a skill.
 
     The mission can be run at once, and the skill has tests. The folder DIR must be empty or must not exist.
-    The project need not be installed: commands that are run in DIR find its skills.
+    The project need not be installed: commands that are run in DIR find its skills. With --urdf, the project
+    contains a copy of the model, an arm file, and a cell with this arm.
     """
     package = make_package_name(folder) if name is None else check_package_name(name, f'--name "{name}"')
-    files = write_project(folder, package)
+    if urdf:
+        with shared.keep_stdout_clean():
+            files = _write_project_with_arm(folder, package, urdf, flange)
+    else:
+        files = write_project(folder, package)
     click.echo(f"{folder}: {', '.join(files)}")
     # `uv run executive init` activates the virtual environment only for this command.
     click.echo(f"Type, after `. {shlex.quote(str(Path(sys.prefix) / 'bin' / 'activate'))}`:")

@@ -1,0 +1,263 @@
+"""Report about an arm in a cell, from its URDF: joints, solver, reach, self-collisions, proposed poses."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from executive.arms.urdf import JointChain, find_model, propose_flange, read_chain
+from executive.cell.arm import Goal
+from executive.cell.arm_config import ArmConfig, ArmFile
+from executive.cell.config import CellConfig
+from executive.errors import InputError, Unreachable
+from executive.geometry import Array, make_tool_down_pose
+from executive.motion.configurations import COARSE_ANGLE_STEP, find_configuration_pairs
+from executive.motion.joints import Kinematics, build_planning_kinematics
+from executive.motion.reach import RADIUS_STEP, WORKSPACE, Reach, format_bin, measure_reach
+from executive.station.camera import CellCamera, Robot
+from executive.station.check import StillRobot, find_payload_errors
+
+DEFAULT_ACCELERATION = 5.0
+"""Proposed joint acceleration [rad/s²], which the torques of the arms UR5e, xArm6 and Panda permit."""
+JERK_TIME = 0.1
+"""Proposed time from rest to full acceleration [s]."""
+DEFAULT_SOURCE = (
+    "Position, velocity and effort: the URDF. Acceleration: {acceleration:g} rad/s², cautious for arms of "
+    "this size; replace it by the value of the data sheet. Jerk: ten times the acceleration. Braking: 1.2 "
+    "times the acceleration, and twice the jerk."
+)
+"""Source of proposed limits."""
+COMPARED_POSE_COUNT = 40
+"""Number of tool poses for which an analytic solver is compared with the numerical one."""
+SAME_SOLUTION = 0.01
+"""Maximum difference between two equal solutions in a joint [rad]."""
+POSE_GRID = (np.linspace(-0.1, 0.7, 9), np.linspace(-0.6, 0.6, 13), (0.05, 0.2, 0.35))
+"""Positions of the tool for proposed poses: x and y from the base, z from the travel height [m]."""
+TURN_WEIGHT = 1e-3
+"""Weight of the largest joint position: of equally good configurations, the least turned one is best."""
+JACOBIAN_STEP = 1e-5
+"""Step of a joint for a numerical derivative [rad]."""
+PIXELS_PER_METRE = 400
+"""Resolution of the picture of the reach."""
+DARK = (40, 40, 40)
+"""Colour of lines and texts in the picture of the reach."""
+
+
+@dataclass(frozen=True, eq=False)
+class ArmReport:
+    """What the URDF of an arm means in a cell.
+
+    Attributes:
+        config: The cell with the arm.
+        chain: Joints of the arm.
+        solver: Name of the solver, and how many solutions of the numerical search it finds.
+        reach: Reach of the arm.
+        pairs: Names of the links that can collide with each other.
+        poses_deg: Proposed joint positions by name [degree]: `home`, and `aside` on the other side.
+        problems: Errors of the arm in the cell, without those about poses.
+    """
+
+    config: CellConfig
+    chain: JointChain
+    solver: str
+    reach: Reach
+    pairs: Sequence[tuple[str, str]]
+    poses_deg: dict[str, list[float]]
+    problems: Sequence[str]
+
+
+def propose_arm(urdf: str, name: str, flange_link: str = "") -> dict[str, Any]:
+    """Return the content of an arm file for a URDF, with cautious accelerations.
+
+    Raises:
+        InputError: The URDF describes no arm, or lacks limits; the message names the joint.
+    """
+    flange = propose_flange(urdf, flange_link)
+    chain = read_chain(urdf, flange)
+    limits = {"positions": chain.lower + chain.upper, "velocity": chain.velocity, "effort": chain.effort}
+    for kind, values in limits.items():
+        if np.isnan(values).any():
+            joint = chain.joints[int(np.argmax(np.isnan(values)))]
+            problem = f'the joint "{joint}" of the model {find_model(urdf).name} has no limits of {kind}'
+            raise InputError(f"{problem}; complete its <limit> in the URDF, or the keys of an arm file")
+    flange_entry: dict[str, Any] = {"link": flange.link}
+    if any(flange.rotation_deg):
+        flange_entry["rotation_deg"] = [round(angle) for angle in flange.rotation_deg]
+    acceleration = DEFAULT_ACCELERATION
+    return {
+        "arm": name,
+        "urdf": urdf,
+        "flange": flange_entry,
+        "limits": {
+            "source": DEFAULT_SOURCE.format(acceleration=acceleration),
+            "acceleration": acceleration,
+            "jerk": acceleration / JERK_TIME,
+            "stop_acceleration": 1.2 * acceleration,
+            "stop_jerk": 2 * acceleration / JERK_TIME,
+        },
+    }
+
+
+def place_arm(cell: CellConfig, arm: ArmFile, base: Sequence[float] = (0.0, 0.0, 0.0)) -> CellConfig:
+    """Return a cell with another arm, whose only pose is the middle of its joint ranges."""
+    middle = tuple((lower + upper) / 2 for lower, upper in arm.limits.position_ranges_deg)
+    content = {**arm.model_dump(), "base": {"position": tuple(base)}, "poses_deg": {"home": middle}}
+    return cell.model_copy(update={"arm": ArmConfig.model_validate(content)})
+
+
+def report_arm(config: CellConfig) -> ArmReport:
+    """Return the report about the arm of a cell; existing poses do not count.
+
+    Raises:
+        InputError: The model of the arm is invalid.
+    """
+    from executive.physics.arm_model import find_arm_model_errors
+    from executive.physics.collision import ClearanceChecker
+
+    if model_errors := list(find_arm_model_errors(config.arm)):
+        raise InputError("; ".join(message for _, message in model_errors))
+    chain = read_chain(config.arm.urdf, config.arm.flange)
+    kinematics = build_planning_kinematics(config)
+    reach = measure_reach(config, kinematics)
+    with contextlib.closing(ClearanceChecker(config)) as checker:
+        poses_deg = propose_poses(config, kinematics, checker)
+        get_name = checker.world.get_link_name
+        pairs = [(get_name(a), get_name(b)) for a, b in checker.self_collision_pairs]
+        posed = _with_poses(config, poses_deg)
+        problems = [message for _, message in find_payload_errors(posed, checker.world)]
+    if not poses_deg:
+        problems.append("no pose keeps the arm clear of everything and out of the view of the camera")
+    solver = _describe_solver(config, kinematics)
+    return ArmReport(config, chain, solver, reach, pairs, poses_deg, problems)
+
+
+def _with_poses(config: CellConfig, poses_deg: dict[str, list[float]]) -> CellConfig:
+    poses = {name: tuple(pose) for name, pose in poses_deg.items()}
+    arm = config.arm.model_copy(update={"poses_deg": {**config.arm.poses_deg, **poses}})
+    return config.model_copy(update={"arm": arm})
+
+
+def propose_poses(config: CellConfig, kinematics: Kinematics, checker: Any) -> dict[str, list[float]]:
+    """Return joint positions [degree] with the tool down and the table in view: `home` and `aside`.
+
+    Each pose keeps the margin to everything, and is far from joint limits and singular configurations, `home`
+    at positive y, and `aside` at negative y. Without any such pose, the result is empty.
+    """
+    robot: Any = StillRobot(config)
+    camera = CellCamera(config, robot, Robot(robot, robot), Robot(robot, robot), kinematics)
+    lower, upper = np.radians(config.arm.limits.position_ranges_deg).T
+    middle = (lower + upper) / 2
+    base = np.array(config.arm.base.position)
+    best: dict[str, tuple[float, Array]] = {}
+    xs, ys, zs = POSE_GRID
+    for x, y, z in np.array(np.meshgrid(xs, ys, zs)).reshape(3, -1).T.tolist():
+        name = "home" if y >= 0 else "aside"
+        goal = Goal((base[0] + x, base[1] + y, config.travel_height + z))
+        try:
+            qs = find_configuration_pairs(kinematics, goal, 0.0, middle).lower_qs
+        except Unreachable:
+            continue
+        scores = [_rate_configuration(kinematics, each, lower, upper) for each in qs]
+        score = max(scores)
+        q = qs[int(np.argmax(scores))]
+        if score <= best.get(name, (0.0, q))[0] or checker.find_violation(q) is not None:
+            continue
+        robot.q = q
+        if camera.sees_table():
+            best[name] = (score, q)
+    if "aside" in best:
+        best.setdefault("home", best["aside"])
+    return {name: np.degrees(best[name][1]).round(1).tolist() for name in ("home", "aside") if name in best}
+
+
+def _rate_configuration(kinematics: Kinematics, q: Array, lower: Array, upper: Array) -> float:
+    """Return the distance of joint positions `(n,)` [rad] from the limits times that from a singularity.
+
+    The factors are the part of the smallest joint range that is left, and the smallest singular value of the
+    Jacobian of the tool's position [m/rad].
+    """
+    ranges = np.minimum(upper - lower, math.tau)  # A joint that turns all round has no limits.
+    room = float((np.minimum(q - lower, upper - q) / ranges).min())
+    tcps, _ = kinematics.compute_tcps_and_axes(np.vstack([q, q + JACOBIAN_STEP * np.eye(len(q))]))
+    jacobian = (tcps[1:] - tcps[0]) / JACOBIAN_STEP
+    distance = room * float(np.linalg.svd(jacobian, compute_uv=False).min())
+    return distance - TURN_WEIGHT * float(np.abs(q).max())
+
+
+def _describe_solver(config: CellConfig, kinematics: Kinematics) -> str:
+    """Return the name of the solver; of an analytic one, with its coverage against the numerical search."""
+    name = str(getattr(kinematics, "solver_name", config.arm.solver))
+    if name != "eaik":
+        return name
+    numeric_arm = config.arm.model_copy(update={"solver": "numeric"})
+    numeric = build_planning_kinematics(config.model_copy(update={"arm": numeric_arm}))
+    base = np.array(config.arm.base.position)
+    rng = np.random.default_rng(0)
+    counts = np.zeros(2, dtype=int)  # found solutions, and all solutions of the numerical search
+    q_seed = np.zeros(config.arm.joint_count)
+    for _ in range(COMPARED_POSE_COUNT):
+        offset = rng.uniform((0.2, -0.5, 0.05), (0.8, 0.5, 0.4))
+        poses = [make_tool_down_pose(base + offset)]
+        qs_by_solver = []
+        for solver in (kinematics, numeric):
+            try:
+                (qs,), _ = solver.solve_all(poses, q_seed, COARSE_ANGLE_STEP)
+                qs_by_solver.append(qs[solver.joint_range.contains(qs)])
+            except Unreachable:
+                qs_by_solver.append(np.zeros((0, len(q_seed))))
+        found, expected = qs_by_solver
+        if config.arm.joint_count > 6:  # A redundant arm has infinitely many solutions.
+            counts += (len(found) > 0, len(expected) > 0)
+            continue
+        differences = np.abs(np.sin((expected[:, None] - found) / 2)).max(axis=2, initial=0.0)
+        counts += (int((differences.min(axis=1, initial=1.0) < SAME_SOLUTION).sum()), len(expected))
+    noun = "poses" if config.arm.joint_count > 6 else "solutions"
+    return f"eaik ({counts[0]} of the {counts[1]} {noun} that the numerical search finds)"
+
+
+def draw_reach(report: ArmReport) -> NDArray[np.uint8]:
+    """Return a picture `(H, W, 3)`, RGB, of the cell from above: reach, workspace, bins and bases."""
+    config = report.config
+    low = np.array([-0.5, -0.9])
+    size = np.array([1.5, 1.8])
+    height, width = (size * PIXELS_PER_METRE).astype(int)
+    image = np.full((height, width, 3), 255, np.uint8)
+
+    def to_pixel(point: Sequence[float] | Array) -> tuple[int, int]:
+        """Return column and row: x points up and y to the left, as seen from the base."""
+        x, y = (np.asarray(point)[:2] - low) * PIXELS_PER_METRE
+        return width - int(y), height - int(x)
+
+    rows, columns = np.mgrid[:height, :width]
+    points = np.stack([height - rows, width - columns], axis=-1) / PIXELS_PER_METRE + low
+    distances = np.linalg.norm(points - config.arm.base.position[:2], axis=-1)
+    is_reached = np.isin(np.round(distances / RADIUS_STEP), np.round(report.reach.radii / RADIUS_STEP))
+    image[is_reached] = (214, 236, 214)
+
+    def write(text: str, point: Sequence[float] | Array, colour: tuple[int, int, int] = DARK) -> None:
+        column, row = to_pixel(point)
+        cv2.putText(image, text, (column + 10, row), cv2.FONT_HERSHEY_SIMPLEX, 0.45, colour, 1, cv2.LINE_AA)
+
+    low_corner, high_corner = np.array([config.table.x, config.table.y]).T
+    cv2.rectangle(image, to_pixel(low_corner), to_pixel(high_corner), DARK, 2)
+    write(f"workspace {report.reach.fractions[WORKSPACE]:.0%}", (low_corner[0], high_corner[1]))
+    for name, bin in config.bins.items():
+        centre = np.array(bin.position[:2])
+        half = np.array(bin.size[:2]) / 2
+        colour = [int(255 * value) for value in bin.colour]
+        cv2.rectangle(image, to_pixel(centre - half), to_pixel(centre + half), colour, 2)
+        write(f"{name} {report.reach.fractions[format_bin(name)]:.0%}", (centre[0], centre[1] + half[1]))
+    base = np.array(config.arm.base.position[:2])
+    if np.abs(report.reach.best_base - base).max() > 0:
+        cv2.circle(image, to_pixel(report.reach.best_base), 8, DARK, 2)
+        write("best base", report.reach.best_base)
+    cv2.circle(image, to_pixel(base), 8, DARK, -1)
+    write(f"base of {config.arm.arm} (green: in reach)", base)
+    return image
