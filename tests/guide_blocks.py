@@ -24,7 +24,7 @@ ROOT = Path(__file__).parent.parent
 TUTORIAL = "missions/README.md"
 MISSION_GUIDES = (
     TUTORIAL, "missions/expressions.md", "missions/running.md", "missions/editor.md", "missions/detectors.md",
-    "missions/scenes.md",
+    "missions/scenes.md", "missions/arms.md",
 )  # fmt: skip
 GUIDES = ("README.md", *MISSION_GUIDES, "skills/README.md")
 
@@ -112,7 +112,13 @@ def _completed(part: str, whole: str) -> str:
 
 
 def _file_name(text: str) -> str:
-    folders = {"mission": "", "scene": "scenes/", "library": "library/", "cell": "cells/"}
+    folders = {
+        "mission": "",
+        "scene": "scenes/",
+        "library": "library/",
+        "cell": "cells/",
+        "arm": "cells/arms/",
+    }
     content = yaml.safe_load(text)
     key = next(key for key in folders if key in content)
     return f"{folders[key]}{content[key]}.yaml"

@@ -28,7 +28,8 @@ def assert_same(one: Pose, other: Pose, tolerance: float = 1e-7) -> None:
 @settings(max_examples=40)
 def test_every_solution_of_a_reachable_pose_reaches_it(q) -> None:
     goal = ARM.compute_tool_pose(q)
-    for solution in ARM.solve_all(goal, q, math.pi)[0]:
+    (solutions,), _ = ARM.solve_all([goal], q, math.pi)
+    for solution in solutions:
         assert_same(ARM.compute_tool_pose(solution), goal, 1e-6)
 
 

@@ -7,14 +7,18 @@ There are no physics: the positions of the objects are known exactly, and the ar
 Two methods follow the path of textbooks: up to the cell's travel height, across, and straight down. One stops
 at every waypoint; the other follows a spline through the waypoints, timed by TOPP-RA. The lower bound ignores
 all obstacles, so that no motion without collisions is faster.
+
+Planning times are CPU times of the thread, which do not count other processes. The arms of two cells are
+compared in one process, pair by pair in turn.
 """
 
 from __future__ import annotations
 
 import time
 from collections import defaultdict
-from collections.abc import Callable, Sequence
-from itertools import pairwise
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, closing
+from itertools import islice, pairwise
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -22,6 +26,7 @@ from toppra import SplineInterpolator
 from toppra.algorithm import TOPPRA
 from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint
 
+from executive.campaign.evaluation import load_cells
 from executive.cell.arm import Goal, JointState
 from executive.cell.config import CellConfig
 from executive.cell.device_config import STEP
@@ -46,8 +51,21 @@ class PairMotion(NamedTuple):
     planning_times: list[float]
 
 
+class Pair(NamedTuple):
+    """Planner of a pair, joint positions `(n,)` [rad] at its start, its scene, and its motion.
+
+    If the planner finds no motion, `problem` tells why.
+    """
+
+    planner: Planner
+    start: Array
+    scene: Scene
+    motion: PairMotion | None
+    problem: str = ""
+
+
 WaypointPair = tuple[Array, Array]
-"""Waypoints of the textbook path, joint positions `(4, 7)` [rad]: at the start, above the start, above the
+"""Waypoints of the textbook path, joint positions `(4, n)` [rad]: at the start, above the start, above the
 object and at the object; then at the object, above the object, above the bin slot and at the bin slot."""
 
 
@@ -59,7 +77,7 @@ def find_waypoints(
     Args:
         kinematics: Kinematics of the arm.
         limits: Joint limits of the arm.
-        start: Joint positions of the arm at the start `(7,)` [rad].
+        start: Joint positions of the arm at the start `(n,)` [rad].
         touch: Goal at which the tool touches the object.
         drop: Goal at which the tool releases the object.
         height: Travel height of the tool in the world frame [m].
@@ -118,8 +136,8 @@ def find_lower_bound(
 ) -> PairMotion:
     """Return the fastest motions if all obstacles are ignored.
 
-    Each of the two motions is from rest to rest, without a waypoint. Joint 7 is free at both ends; IK branch
-    and swivel are those with the least total time.
+    Each of the two motions is from rest to rest, without a waypoint. The last joint is free at both ends; the
+    branches of the inverse kinematics are those with the least total time.
     """
     touching, dropping = (
         find_configuration_pairs(kinematics, goal, 0.0, start).lower_qs for goal in (touch, drop)
@@ -139,39 +157,87 @@ PEAK_TOLERANCE = 1e-6
 """Rounding error by which a peak may exceed its limit, relative to the limit."""
 
 
-def measure(cell: CellConfig, seed: int = 0, pairs: int = 200) -> Figures:
-    """Measure the motions of the arm of CELL from bin to object to bin, and other ways to move."""
-    figures: Figures = {"cell": cell.cell, "pairs": pairs, "seed": seed}
+def measure(
+    cell: CellConfig,
+    solver: str | None = None,
+    other_solver: str | None = None,
+    reference: str | None = None,
+    seed: int = 0,
+    pairs: int = 200,
+) -> Figures:
+    """Measure the motions of the arm of CELL from bin to object to bin, and other ways to move.
+
+    `--solver` replaces the solver of the arm. With `--other-solver`, a second planner plans the same pairs.
+    With `--reference CELL`, the arm of that cell moves in turn, and the planning times are compared.
+    """
+    cell = replace_solver(cell, solver)
+    figures: Figures = {"cell": cell.cell, "solver": cell.arm.solver, "pairs": pairs, "seed": seed}
     rows: dict[str, list[PairMotion]] = defaultdict(list)
+    reference_motions: list[PairMotion] = []
     problems = []
-    height = cell.travel_height
-    home = np.radians(cell.arm.poses_deg["home"])
-    with open_world(cell) as (world, planner):
-        scenes = SceneGenerator(cell, planner, world, seed)
-        start = planner.plan(home, scenes.draw().drop).end
+    with ExitStack() as stack:
+        all_pairs = stack.enter_context(closing(plan_pairs(cell, seed)))
+        reference_pairs: Iterator[Pair] = iter(())
+        if reference:
+            (reference_cell,) = load_cells((reference,)).values()
+            reference_pairs = stack.enter_context(closing(plan_pairs(reference_cell, seed)))
+        other_planner = None
+        if other_solver:
+            _, other_planner = stack.enter_context(open_world(replace_solver(cell, other_solver)))
         for _ in show_progress(range(pairs), "planned"):
-            world.set_joint_positions(home)
-            scene = scenes.draw()
-            try:
-                motion, end = plan_pair(planner, start, scene)
-            except (Blocked, Unreachable) as error:
-                problems.append(f"not planned: {error}")
+            reference_motions += [pair.motion for pair in islice(reference_pairs, 1) if pair.motion]
+            pair = next(all_pairs)
+            other_pair = try_to_plan(other_planner, pair.start, pair.scene) if other_planner else pair
+            problems += [problem for problem in {pair.problem, other_pair.problem} if problem]
+            if pair.motion is None or other_pair.motion is None:
                 continue
             if not rows:
-                compare_methods(planner, start, scene, height)  # The first call compiles; do not time it.
-            rows["ours"].append(motion)
-            for method, other_motion in compare_methods(planner, start, scene, height).items():
-                rows[method].append(other_motion)
-            start = end
-        methods = [summarize(method, motions, planner.limits) for method, motions in rows.items()]
+                compare_methods(pair, cell.travel_height)  # The first call compiles; do not time it.
+            rows["ours"].append(pair.motion)
+            if other_planner:
+                rows[f"ours, {other_solver}"].append(other_pair.motion)
+            for method, motion in compare_methods(pair, cell.travel_height).items():
+                rows[method].append(motion)
+    methods = [summarize(method, motions, pair.planner.limits) for method, motions in rows.items()]
     for row in methods:
         row["ratio_to_lower_bound"] = row["time_s"] / methods[-1]["time_s"]
+    if reference:
+        reference_ms = compute_mean_planning_time(reference_motions)
+        figures[f"planning_mean_ms of {reference}"] = reference_ms
+        figures["planning_ratio"] = compute_mean_planning_time(rows["ours"]) / reference_ms
     problems += [f"{name} over its limit" for name in PEAKS if methods[0][name] > 1 + PEAK_TOLERANCE]
     return {**figures, "planned_pairs": len(rows["ours"]), "methods": methods, "problems": problems}
 
 
-def plan_pair(planner: Planner, start: Array, scene: Scene) -> tuple[PairMotion, Array]:
-    """Return both motions of a pair, and the posture in which they leave the arm.
+def replace_solver(cell: CellConfig, solver: str | None) -> CellConfig:
+    """Return the cell with another solver of its arm; None: the solver of its arm file."""
+    arm = cell.arm.model_copy(update={"solver": solver or cell.arm.solver})
+    return cell.model_copy(update={"arm": arm})
+
+
+def plan_pairs(cell: CellConfig, seed: int) -> Iterator[Pair]:
+    """Yield random pairs, each of which starts where the last motion ended."""
+    home = np.radians(cell.arm.poses_deg["home"])
+    with open_world(cell) as (world, planner):
+        scenes = SceneGenerator(cell, planner, world, seed)
+        start = planner.plan(home, scenes.draw().drop).end
+        while True:
+            world.set_joint_positions(home)
+            pair = try_to_plan(planner, start, scenes.draw())
+            yield pair
+            start = pair.motion.states[-1].q[-1] if pair.motion else start
+
+
+def try_to_plan(planner: Planner, start: Array, scene: Scene) -> Pair:
+    """Return a pair with both motions, or with the reason why there is none."""
+    try:
+        return Pair(planner, start, scene, plan_pair(planner, start, scene))
+    except (Blocked, Unreachable) as error:
+        return Pair(planner, start, scene, None, f"not planned: {error}")
+
+
+def plan_pair(planner: Planner, start: Array, scene: Scene) -> PairMotion:
+    """Return both motions of a pair.
 
     On contact the arm brakes along the approach; the transit begins where the arm comes to rest.
     """
@@ -185,11 +251,12 @@ def plan_pair(planner: Planner, start: Array, scene: Scene) -> tuple[PairMotion,
     transit, transit_ms = _call_timed(planner.plan, grasp, scene.drop, task)
     duration = touched + len(stop) * STEP + transit.duration
     states = [approach.samples, transit.samples]
-    return PairMotion(duration, states, [approach_ms, transit_ms]), transit.end
+    return PairMotion(duration, states, [approach_ms, transit_ms])
 
 
-def compare_methods(planner: Planner, start: Array, scene: Scene, height: float) -> dict[str, PairMotion]:
+def compare_methods(pair: Pair, height: float) -> dict[str, PairMotion]:
     """Return the motions of the other methods between the same positions; the last one is the lower bound."""
+    planner, start, scene = pair[:3]
     limits = planner.limits
     waypoints = find_waypoints(planner.kinematics, limits, start, scene.touch, scene.drop, height)
     motions = {}
@@ -203,9 +270,14 @@ def compare_methods(planner: Planner, start: Array, scene: Scene, height: float)
 
 def _call_timed(plan: Callable[..., T], *args: Any) -> tuple[T, float]:
     """Return the result of `plan`, and its planning time [ms]."""
-    began = time.perf_counter()
+    began = time.thread_time()
     result = plan(*args)
-    return result, (time.perf_counter() - began) * 1e3
+    return result, (time.thread_time() - began) * 1e3
+
+
+def compute_mean_planning_time(motions: Sequence[PairMotion]) -> float:
+    """Return the mean planning time of a motion [ms]."""
+    return float(np.mean([planning_time for motion in motions for planning_time in motion.planning_times]))
 
 
 def summarize(method: str, motions: Sequence[PairMotion], limits: JointLimits) -> Figures:
@@ -215,6 +287,7 @@ def summarize(method: str, motions: Sequence[PairMotion], limits: JointLimits) -
     planning_times = [planning_time for motion in motions for planning_time in motion.planning_times]
     row = {"method": method, "time_s": float(np.mean([motion.duration for motion in motions]))}
     row |= dict(zip(PEAKS, peaks.tolist(), strict=True))
+    row["planning_mean_ms"] = compute_mean_planning_time(motions) if planning_times else None
     for name, percent in (("planning_median_ms", 50), ("planning_p99_ms", 99)):
         row[name] = float(np.percentile(planning_times, percent)) if planning_times else None
     return row

@@ -108,6 +108,7 @@ class SceneGenerator:
         Raises:
             InputError: None of `MAX_TRIES` scenes could be used.
         """
+        q_seed = np.zeros(self._cell.arm.joint_count)
         for _ in range(MAX_TRIES):
             for body in tuple(self._world.labels):
                 self._world.remove_object(body)
@@ -118,7 +119,7 @@ class SceneGenerator:
                 scene = self._make_scene(bodies)
                 for goal in (scene.approach, scene.drop):
                     length = max(0.0, self._cell.travel_height - goal.position[2])
-                    find_configuration_pairs(self._planner.kinematics, goal, length, np.zeros(7))
+                    find_configuration_pairs(self._planner.kinematics, goal, length, q_seed)
             except Unreachable:
                 continue
             return scene

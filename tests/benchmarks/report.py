@@ -51,6 +51,9 @@ T = TypeVar("T")
 SHARED_OPTIONS: dict[str, tuple[Option, ...]] = {
     "subject": (mission_argument, oracle_option, seed_option, overrides_option),
     "cell": (click.argument("cell", default="overhead"),),
+    "folders": (
+        click.argument("folders", nargs=-1, required=True, type=click.Path(exists=True, path_type=Path)),
+    ),
     "seed": (seed_option,),
     "runs_folder": (runs_option,),
     "workers": (workers_option,),

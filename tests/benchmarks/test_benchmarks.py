@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import pybullet_data
 import pytest
 from events import at, item_changed
 
@@ -18,6 +19,7 @@ from executive.text.files import find_cell
 from tests.benchmarks import (
     continuous,
     damaged_records,
+    foreign_arms,
     halts,
     hostile_input,
     kills,
@@ -59,6 +61,15 @@ def test_halts_of_a_fake_cell_are_in_order_and_a_wrong_ledger_is_found() -> None
     audit = {"right": 1, "wrong_bin": 0, "left": 3, "elsewhere": 1, "unseen": 1}
     assert list(halts.check_ledger(items, audit)) == []
     assert list(halts.check_ledger(items, {**audit, "wrong_bin": 1}))
+
+
+def test_an_arm_of_another_project_plans_a_motion_or_has_a_message(tmp_path: Path) -> None:
+    (tmp_path / "sdf.urdf").write_text("<sdf/>")
+    folders = [Path(pybullet_data.getDataPath(), "kuka_iiwa"), tmp_path]
+    figures = foreign_arms.measure(folders, only=r"/(model|sdf)\.urdf")
+    assert figures["problems"] == []
+    results = ["works", "the model sdf.urdf is no URDF: its root is <sdf>, not <robot>"]
+    assert sorted(row["result"] for row in figures["arms"]) == sorted(results)
 
 
 @pytest.mark.slow

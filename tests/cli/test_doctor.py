@@ -43,7 +43,13 @@ def test_environment_variables_are_named_without_their_values(monkeypatch: pytes
 def test_missing_packages_are_problems_and_missing_extras_are_notes(
     monkeypatch: pytest.MonkeyPatch, missing: tuple[str, ...], status_by_subject: dict[str, str]
 ) -> None:
-    names = {"": ("pybullet", "av"), "view": ("viser", "aiohttp"), "cluster": ("dask",), "train": ("torch",)}
+    names = {
+        "": ("pybullet", "av"),
+        "arms": ("eaik",),
+        "view": ("viser", "aiohttp"),
+        "cluster": ("dask",),
+        "train": ("torch",),
+    }
     monkeypatch.setattr(plugins, "find_version", lambda name: "" if name in missing else "1.0")
     monkeypatch.setattr(plugins, "list_requirements", names.__getitem__)
     results = list(setup.check_packages())

@@ -97,8 +97,8 @@ def test_places_out_of_reach_and_too_many_objects_are_reported(load: Load) -> No
     assert not list(load_checker("fake").check(load(), Path()))
     wrong = {"bins__blue_bin__position": "[0.2, 0.9, 0.0]", "safe_place": "[0.9, 0.0, 0.0]"}
     errors = list(load_checker("fake").check(load(**wrong, table__objects="[0, 19]"), Path()))
-    assert [(".".join(map(str, key)), text.split(":")[0][:35]) for key, text in errors] == [
-        ("table.objects", "the table has room for 18 objects, "),
+    assert [(".".join(map(str, key)), text.split(":")[0][:34]) for key, text in errors] == [
+        ("table.objects", "the table has room for 18 objects,"),
         ("bins.blue_bin.position", 'the bin "blue_bin" is out of reach'),
         ("safe_place", "the safe place is out of reach"),
     ]

@@ -55,14 +55,19 @@ class SixJointArm:
         return np.add(tip, (0.0, 0.0, HEIGHT)), axis
 
     def find_branch(self, q: ArrayLike) -> BranchKey:
-        qs, branches = self.solve_all(self.compute_tool_pose(q), q, 0.0)
+        (qs,), branches = self.solve_all([self.compute_tool_pose(q)], q, 0.0)
         return branches[int(np.argmin(np.abs(wrap_angles(qs - q)).max(axis=1)))]
 
     def solve(self, poses: Sequence[Pose], branch: BranchKey) -> Array:
         (index,) = branch
-        return np.array([self.solve_all(X_WT, np.zeros(6), 0.0)[0][int(index)] for X_WT in poses])
+        return np.array([self._solve_pose(X_WT)[int(index)] for X_WT in poses])
 
-    def solve_all(self, X_WT: Pose, q_seed: ArrayLike, angle_step: float) -> tuple[Array, list[BranchKey]]:
+    def solve_all(
+        self, poses: Sequence[Pose], q_seed: ArrayLike, angle_step: float
+    ) -> tuple[Array, list[BranchKey]]:
+        return np.array([self._solve_pose(pose) for pose in poses]), [(index,) for index in range(len(FLIPS))]
+
+    def _solve_pose(self, X_WT: Pose) -> Array:
         x, y, z = X_WT.position - self._wrist_to_tool * X_WT.rotation[:, 2] - (0.0, 0.0, HEIGHT)
         radius = math.hypot(x, y)
         cos3 = (radius**2 + z**2 - UPPER_ARM**2 - FOREARM**2) / (2 * UPPER_ARM * FOREARM)
@@ -79,7 +84,7 @@ class SixJointArm:
             row[4] = wrist * math.atan2(math.hypot(c[0], c[1]), c[2])
             row[3] = math.atan2(wrist * c[1], wrist * c[0])
             row[5] = math.atan2(wrist * b[2], -wrist * a[2])
-        return wrap_angles(qs), [(index,) for index in range(len(FLIPS))]
+        return wrap_angles(qs)
 
     def _last_frame(self, q: ArrayLike) -> tuple[Array, Array]:
         frame = self.compute_joint_frames(q)[-1]

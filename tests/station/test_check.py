@@ -89,7 +89,7 @@ def test_an_unknown_solver_is_a_finding_with_the_installed_solvers(overhead: Cel
     config = overhead.model_copy(update={"arm": overhead.arm.model_copy(update={"solver": "r2d2"})})
     ((keys, message),) = load_checker(kind).check(config, Path())
     assert keys == ("arm", "solver")
-    assert message.endswith("Installed solvers: iiwa14.")
+    assert message.endswith("Installed solvers: auto, eaik, iiwa14, numeric.")
 
 
 def test_a_wrong_model_of_the_arm_is_a_finding_with_every_driver(overhead: CellConfig) -> None:

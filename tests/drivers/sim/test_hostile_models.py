@@ -9,10 +9,11 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
+from executive.arms.urdf import find_model
 from executive.cell.config import ObjectConfig
 from executive.drivers.sim.models import compute_mass, load_mesh
 from executive.errors import InputError
-from executive.physics.model_files import find_arm_model_errors, find_model, read_mesh
+from executive.physics.model_files import read_mesh
 
 LEVELS = "".join(f"<!ENTITY a{number + 1} '{f'&a{number};' * 10}'>" for number in range(9))
 BOMB = f"<!DOCTYPE r [<!ENTITY a0 'ha'>{LEVELS}]><robot name='&a9;'/>"
@@ -45,7 +46,7 @@ OUTSIDE = ("/etc/x.obj", "../x.obj", "link.obj", "file:///etc/x.obj", "http://x.
     [
         *(("visual", mesh, f'names the file "{mesh}", which is outside of its folder; copy')
           for mesh in OUTSIDE),
-        *((part, "pipe.obj", r"^there is no model .*pipe\.obj, neither beside the cell file nor")
+        *((part, "pipe.obj", r'names the file "pipe\.obj", but there is no file .*pipe\.obj; copy')
           for part in ("visual", "collision")),
         ("collision", "m.obj", r"^the model m\.obj has more than 20000 triangles; simplify the mesh$"),
     ],
@@ -90,10 +91,3 @@ def test_the_materials_and_textures_of_a_mesh_are_checked_like_the_mesh(mesh, ma
     (tmp_path / "m.obj").write_text(f"{mesh}\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     with pytest.raises(InputError, match=error):
         read_mesh(tmp_path / "m.obj")
-
-
-def test_a_damaged_mesh_of_an_arm_is_an_error(overhead, tmp_path):
-    (tmp_path / "c.stl").write_bytes(b"damaged")
-    (tmp_path / "arm.urdf").write_text("<robot><collision><mesh filename='c.stl'/></collision></robot>")
-    arm = overhead.arm.model_copy(update={"urdf": str(tmp_path / "arm.urdf")})
-    assert "the model c.stl is no STL mesh" in next(find_arm_model_errors(arm))[1]

@@ -1,0 +1,178 @@
+"""`executive arm` and `executive init --urdf`: from a URDF to an arm file, and to the first sorted object."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+import math
+import re
+import shlex
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pybullet
+import pytest
+from at_terminal import invoke
+from PIL import Image
+
+from executive.arms import urdf
+from executive.arms.urdf import find_model, find_package_folder
+from executive.cell.arm_config import BaseConfig
+from executive.cell.config import CellConfig
+from executive.geometry import Pose
+from executive.mission.cell_file import load_cell
+from executive.motion.joints import build_planning_kinematics
+from executive.motion.reach import find_braking_errors, find_places_out_of_reach, measure_reach
+from executive.physics.arm_model import ArmHulls
+from executive.physics.cell_world import CellWorld
+from executive.station.check import find_payload_errors
+from executive.text.files import get_shipped_folder
+
+SHIPPED = get_shipped_folder()
+
+
+@pytest.fixture
+def xarm6() -> CellConfig:
+    return load_cell(SHIPPED / "cells" / "xarm6.yaml")
+
+
+def with_arm(config: CellConfig, **changes: object) -> CellConfig:
+    return config.model_copy(update={"arm": config.arm.model_copy(update=changes)})
+
+
+@pytest.fixture
+def model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of the model of the xArm6 with its gripper, as in a project of a user."""
+    folder = find_package_folder("pybullet_data")
+    assert folder is not None
+    shutil.copytree(folder / "xarm", tmp_path / "bench")
+    monkeypatch.chdir(tmp_path)
+    return Path("bench/xarm6_with_gripper.urdf")
+
+
+def test_it_describes_a_urdf_and_writes_an_arm_file_that_it_reads(model: Path) -> None:
+    result = invoke("arm", str(model), "--write", "arm.yaml", "--picture", "reach.png", "--json")
+    assert result.exit_code == 0, result.output
+    value = json.loads(result.stdout)
+    assert (value["flange"]["link"], value["solver"]) == ("link6", "numeric")
+    assert [joint["name"] for joint in value["joints"]] == [f"joint{number}" for number in range(1, 7)]
+    assert "left_finger" in value["left_out"]
+    assert (value["reach"]["the workspace"], value["reach"]['the bin "yellow_bin"']) == (
+        1,
+        pytest.approx(2 / 3),
+    )
+    assert set(value["reach_from_best_base"].values()) == {1}
+    assert list(value["poses_deg"]) == ["home", "aside"]
+    with Image.open("reach.png") as image:
+        shades = {colour for _, colour in image.getcolors(10_000) or ()}
+    assert (214, 236, 214) in shades
+    again = json.loads(invoke("arm", "arm.yaml", "--json").stdout)
+    assert (again["joints"], again["poses_deg"]) == (value["joints"], value["poses_deg"])
+
+
+def test_what_is_no_arm_is_refused_with_the_link_or_joint(model: Path) -> None:
+    for words, message in (
+        (("cube.urdf",), "the model cube.urdf has no chain of revolute joints"),
+        ((str(model), "--flange", "link_base"), 'has 0 joint(s) up to the link "link_base"'),
+        (("nothing.urdf",), "there is no model nothing.urdf"),
+        ((str(model), "--write", "elsewhere/arm.yaml"), "outside of its folder"),
+    ):  # fmt: skip
+        Path("elsewhere").mkdir(exist_ok=True)
+        result = invoke("arm", *words)
+        assert (result.exit_code, message in result.stderr) == (2, True), result.stderr
+
+
+@pytest.mark.slow
+def test_the_guide_leads_from_a_urdf_to_sorted_objects(model: Path) -> None:
+    guide = (SHIPPED / "arms.md").read_text()
+    steps = re.findall(r"^\d\. `(.*?)`", guide, re.MULTILINE)
+    assert len(steps) == 2
+    init = steps[0].replace("my_arm/robot.urdf", str(model)).replace("tool0", "link6")
+    assert invoke(*shlex.split(init)[1:]).exit_code == 0
+    change_folder, _, run = steps[1].partition(" && ")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(change_folder.split()[1])
+        result = invoke(*shlex.split(run)[1:], "--seed", "3", "--json", "--quiet")
+    value = json.loads(result.stdout)
+    assert (value["status"], value["items"]["placed"]) == ("SUCCESS", value["items"]["seen"])
+    assert value["audit"]["agrees"] and value["items"]["placed"] >= 3
+
+
+def test_places_out_of_reach_have_an_advice_that_helps(xarm6: CellConfig) -> None:
+    far = with_arm(xarm6, base=BaseConfig())
+    ((keys, message),) = find_places_out_of_reach(far)
+    assert keys == ("bins", "yellow_bin", "position")
+    assert 'the bin "yellow_bin" is out of reach (33% of it): the tool cannot reach' in message
+    x, y = measure_reach(far, build_planning_kinematics(far)).best_base.tolist()
+    assert f"with arm.base.position [{x:g}, {y:g}, ...], it reaches everything" in message
+    moved = with_arm(xarm6, base=BaseConfig(position=(x, y, 0.0)))
+    assert not list(find_places_out_of_reach(moved))
+
+
+def test_a_descent_from_which_the_arm_cannot_stop_in_time_is_an_error(xarm6: CellConfig) -> None:
+    assert not list(find_braking_errors(xarm6))
+    fast = xarm6.model_copy(update={"motion": xarm6.motion.model_copy(update={"descent_speed": 0.05})})
+    ((keys, message),) = find_braking_errors(fast)
+    assert keys == ("motion", "descent_speed")
+    assert re.search(
+        r"at 0.05 m/s, the arm xarm6 needs 1\.\d+ mm to stop, but .* only 1 mm .*at most 0.03", message
+    )
+
+
+def test_joints_too_weak_for_the_load_are_an_error(xarm6: CellConfig) -> None:
+    world = CellWorld(xarm6, visuals=False)
+    assert not list(find_payload_errors(xarm6, world))
+    cube = xarm6.objects["cube"].model_copy(update={"mass": 9.0})
+    heavy = xarm6.model_copy(update={"objects": {"cube": cube}})
+    messages = dict(find_payload_errors(heavy, world))
+    world.close()
+    assert re.match(
+        r"joint \d needs [\d.]+ Nm to hold arm, tool and 9 kg", messages["arm", "poses_deg", "home"]
+    )
+
+
+@pytest.mark.parametrize("name", ["overhead", "xarm6", "panda"])
+def test_the_hulls_hide_the_pixels_of_the_arm_and_little_more(name: str) -> None:
+    config = load_cell(SHIPPED / "cells" / f"{name}.yaml")
+    moved = with_arm(config, base=BaseConfig(position=(0.1, -0.1, 0.0), yaw_deg=40.0))
+    world = CellWorld(moved)
+    q = np.radians(config.arm.poses_deg["home"]) + 0.3
+    world.set_joint_positions(q)
+    eye = np.array([1.4, 0.3, 1.5])
+    z = np.array([0.2, 0.1, 0.3]) - eye
+    z /= np.linalg.norm(z)
+    x = np.cross(z, [0, 0, 1]) / np.linalg.norm(np.cross(z, [0, 0, 1]))
+    X_WC = Pose(np.stack([x, np.cross(z, x), z], axis=1), eye)
+    view = world.client.computeViewMatrix(eye.tolist(), (eye + z).tolist(), [0, 0, 1])
+    projection = world.client.computeProjectionMatrixFOV(50, 1, 0.05, 5)
+    flags = pybullet.ER_SEGMENTATION_MASK_OBJECT_AND_LINKINDEX
+    segments = np.reshape(world.client.getCameraImage(240, 240, view, projection, flags=flags)[4], (240, 240))
+    is_arm = (segments & 0xFFFFFF == world.arm) & (segments >= 0) & (segments >> 24 != world.tool_index + 1)
+    world.close()
+    focal_length = 120 / math.tan(math.radians(25))
+    mask = np.zeros((240, 240), np.uint8)
+    matrix = np.array([[focal_length, 0, 120], [0, focal_length, 120], [0, 0, 1]])
+    ArmHulls(moved.arm).draw(mask, q, matrix, X_WC)
+    assert is_arm.sum() > 1500
+    assert not (is_arm & (mask == 0)).any()
+    assert mask.sum() < 1.8 * is_arm.sum()
+
+
+def test_a_model_in_a_package_stays_in_its_folder(monkeypatch: pytest.MonkeyPatch) -> None:
+    name = "package:pybullet_data/xarm/xarm6_robot.urdf"
+    assert find_model(name) == find_model("xarm/xarm6_robot.urdf")
+    monkeypatch.setattr(urdf, "find_package_folder", lambda name: None)
+    monkeypatch.setattr(importlib.metadata, "requires", lambda _: ['pybullet-data; extra == "arms"'])
+    with pytest.raises(urdf.InputError, match="`uv sync --extra arms` or `pip install"):
+        find_model(name)
+    monkeypatch.undo()
+    for reference, message in (
+        ("package:pybullet_data/../numpy/__init__.py", "leads out of the folder"),
+        ("package:pybullet_data//etc/passwd", "leads out of the folder"),
+        ("package:nowhere_at_all/a.urdf", "is not installed; install the package"),
+        ("package:os.path/a.urdf", "is not installed"),
+        ("package:pybullet_data/a.urdf", 'has no file "a.urdf"'),
+    ):
+        with pytest.raises(urdf.InputError, match=message):
+            find_model(reference)
