@@ -6,20 +6,23 @@ EAIK decomposes arms with six joints. An arm with seven joints is solved for man
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from executive.arms.numeric import ChainKinematics
+from executive.arms.numeric import ChainKinematics, make_matrix
 from executive.arms.urdf import ARMS_EXTRA
 from executive.cell.arm_config import ArmConfig
 from executive.errors import InputError
 from executive.geometry import Array, Pose
 
-LOCKED_STEP_FACTOR = 3.0
+LOCKED_STEP_FACTOR = 0.7
 """Distance between the positions of the last joint of an arm with seven joints, as a multiple of the distance
-between redundancy angles: with 36 positions, 99.96 % of the reachable poses of a Panda have a solution."""
+between redundancy angles. With 103 positions (3.5 degrees), EAIK finds 99.4 % of the solutions of a Panda."""
+MIN_LOCKED_STEP = math.radians(1.0)
+"""Minimum distance between these positions [rad]."""
 
 
 def build_analytic(
@@ -49,29 +52,25 @@ def build_analytic(
             robots[last_position] = Robot(axes.T, displacements.T, X_WT.rotation, locked, True)
         return robots[last_position]
 
-    lower = float(kinematics.joint_range.lower[-1])
-    upper = float(kinematics.joint_range.upper[-1])
-    if count not in (6, 7) or not get_robot((lower + upper) / 2).has_known_decomposition():
+    if count not in (6, 7) or not get_robot(0.0).has_known_decomposition():
         raise InputError(
             f"the solver eaik does not know the arm {arm.arm} with {count} joints; use the solver `numeric`"
         )
 
-    def find_solutions(goal: Pose, q_seed: Array, angle_step: float) -> Array:
+    def find_starts(goal: Pose, q_seed: Array, angle_step: float) -> Array:
         del q_seed
         positions: Sequence[float] = [0.0]
         if count == 7:
-            positions = np.arange(lower, upper, LOCKED_STEP_FACTOR * angle_step).tolist()
-        matrix = np.eye(4)
-        matrix[:3, :3] = goal.rotation
-        matrix[:3, 3] = goal.position
-        answers = [get_robot(position).calculate_IK(matrix) for position in positions]
-        # A least-squares answer is no solution.
-        found = [
-            q for answer in answers for q, is_bad in zip(answer.Q, answer.is_LS, strict=True) if not is_bad
-        ]
-        return np.array(found).reshape(-1, count)
+            positions = np.arange(
+                -math.pi, math.pi, max(LOCKED_STEP_FACTOR * angle_step, MIN_LOCKED_STEP)
+            ).tolist()
+        matrix = make_matrix(goal)
+        # An answer without an exact solution is a least-squares solution: with seven joints, there often is a
+        # solution at another position of the last joint.
+        answers = [q for position in positions for q in get_robot(position).calculate_IK(matrix).Q]
+        return np.array(answers).reshape(-1, count)
 
-    kinematics.find_solutions = find_solutions
+    kinematics.find_starts = find_starts
     kinematics.solver_name = "eaik"
     return kinematics
 

@@ -363,7 +363,12 @@ def _align_z(path: Path, joint: Element) -> Array:
     if not 1e-6 < length < 1e6:
         place = f'the joint "{joint.get("name")}" of the model {path.name}'
         raise InputError(f"{place} has the axis {axis}; write its direction, with a length of 1")
-    z = axis / length
+    return align_z(axis)
+
+
+def align_z(axis: Array) -> Array:
+    """Return a rotation `(3, 3)` whose z axis has the direction of a vector `(3,)`."""
+    z = axis / np.linalg.norm(axis)
     x = np.array([1.0, 0.0, 0.0]) if abs(z[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
     x = x - (x @ z) * z
     x /= np.linalg.norm(x)

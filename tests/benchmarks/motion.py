@@ -36,7 +36,7 @@ from executive.motion.configurations import find_configuration_pairs, find_verti
 from executive.motion.joints import JointLimits, Kinematics
 from executive.motion.planner import Planner
 from executive.motion.trajectory import Connector, Trajectory, compute_peak_fractions, plan_braking
-from tests.benchmarks.motion_scenes import Scene, SceneGenerator, open_world
+from tests.benchmarks.motion_scenes import Scene, SceneGenerator, open_world, replace_solver
 from tests.benchmarks.report import Figures, run_command, show_progress
 from tests.motion.joint_states import reach
 
@@ -207,12 +207,6 @@ def measure(
         figures["planning_ratio"] = compute_mean_planning_time(rows["ours"]) / reference_ms
     problems += [f"{name} over its limit" for name in PEAKS if methods[0][name] > 1 + PEAK_TOLERANCE]
     return {**figures, "planned_pairs": len(rows["ours"]), "methods": methods, "problems": problems}
-
-
-def replace_solver(cell: CellConfig, solver: str | None) -> CellConfig:
-    """Return the cell with another solver of its arm; None: the solver of its arm file."""
-    arm = cell.arm.model_copy(update={"solver": solver or cell.arm.solver})
-    return cell.model_copy(update={"arm": arm})
 
 
 def plan_pairs(cell: CellConfig, seed: int) -> Iterator[Pair]:

@@ -30,6 +30,12 @@ MAX_TRIES = 50
 """Maximum number of scenes drawn to find one whose object can be held and reached."""
 
 
+def replace_solver(cell: CellConfig, solver: str | None) -> CellConfig:
+    """Return the cell with another solver of its arm; None: the solver of its arm file."""
+    arm = cell.arm.model_copy(update={"solver": solver or cell.arm.solver})
+    return cell.model_copy(update={"arm": arm})
+
+
 @contextmanager
 def open_world(cell: CellConfig) -> Iterator[tuple[World, Planner]]:
     """Yield a world without objects, and a planner that makes all checks of the planner of a run."""

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pybullet_data
 import pytest
 from events import at, item_changed
@@ -23,6 +24,7 @@ from tests.benchmarks import (
     halts,
     hostile_input,
     kills,
+    kinematics,
     longest_step,
     mutations,
     soak,
@@ -118,6 +120,13 @@ def test_control_steps_and_ticks_are_measured(tmp_path: Path) -> None:
     assert row["steps"] > 100 and 0 < row["longest_cpu_ms"] <= row["longest_ms"] * 1.1
     assert 0 < tick.measure_ticks(10, blocks=3)["ratio"] <= tick.MAX_RATIO
     assert tick.measure_changes(10, 3, tmp_path / "ticks")["changes"] == 20
+
+
+def test_solutions_of_an_arm_are_compared_with_an_exhaustive_search() -> None:
+    figures = kinematics.measure(load_cell(find_cell("xarm6")), poses=2, starts=100)
+    assert (figures["problems"], figures["reachable"], figures["found_share"]) == ([], 2, 1)
+    expected = np.array([[1.0] * 6, [2.0] * 6])
+    assert kinematics.count_found(expected, expected[1:] + 2 * np.pi) == 1
 
 
 def test_the_shipped_map_is_what_the_code_measures() -> None:
