@@ -6,6 +6,7 @@ The entry points of the project in the working directory are found even if the p
 from __future__ import annotations
 
 import functools
+import importlib.util
 import os
 import platform
 import re
@@ -24,13 +25,17 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from executive.errors import InputError, Interrupted, to_text
-from executive.text.files import read_source
+from executive.text.files import has_outside_link, is_outside_path, read_source
 
 if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
 
+PACKAGE_PREFIX = "package:"
+"""Prefix of the name of a file in an installed package, as in `package:airo_models/arms/arm.urdf`."""
+ARMS_EXTRA = "arms"
+"""Extra with the packages of the models of shipped arms."""
 DISTRIBUTION = "pick-place-executive"
 """Name of the distribution of this project; `executive` in the package index is another project."""
 MAX_PROJECT_LENGTH = 100_000
@@ -246,3 +251,31 @@ def find_version(name: str) -> str:
         return metadata.version(name)
     except metadata.PackageNotFoundError:
         return ""
+
+
+def find_package_file(reference: str) -> Path:
+    """Return the file `path` in the installed package `NAME`, for `package:NAME/path`, without an import.
+
+    Raises:
+        InputError: The package is not installed, the path leaves its folder, or the file does not exist.
+    """
+    name, _, path = reference.removeprefix(PACKAGE_PREFIX).partition("/")
+    folder = find_package_folder(name)
+    if folder is None:
+        advice = "install the package, or copy the model beside the file that names it"
+        if canonicalize_name(name) in list_requirements(ARMS_EXTRA):
+            command = f'uv sync --extra {ARMS_EXTRA}` or `pip install "{DISTRIBUTION}[{ARMS_EXTRA}]"'
+            advice = f"install it with `{command}`"
+        raise InputError(f'the package "{name}" of the model {reference} is not installed; {advice}')
+    if is_outside_path(path) or has_outside_link(folder, path):
+        raise InputError(f'"{reference}" leads out of the folder of the package "{name}"; name a file in it')
+    if not os.path.isfile(folder / path):
+        raise InputError(f'the package "{name}" has no file "{path}" in {folder}')
+    return folder / path
+
+
+def find_package_folder(name: str) -> Path | None:
+    """Return the folder of an installed Python package, which is not imported, or None."""
+    spec = importlib.util.find_spec(name) if name.isidentifier() else None
+    folders = (spec and spec.submodule_search_locations) or ()
+    return next(map(Path, folders), None)

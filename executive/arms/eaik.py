@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from executive.arms.numeric import ChainKinematics, make_matrix
-from executive.arms.urdf import ARMS_EXTRA
 from executive.cell.arm_config import ArmConfig
 from executive.errors import InputError
 from executive.geometry import Array, Pose
+from executive.plugins import ARMS_EXTRA
 
 LOCKED_STEP_FACTOR = 0.7
 """Distance between the positions of the last joint of an arm with seven joints, as a multiple of the distance

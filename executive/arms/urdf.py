@@ -6,40 +6,27 @@ installed Python package, or by a path in the folder of pybullet_data.
 
 from __future__ import annotations
 
-import importlib.util
 import math
 import os
 import re
 from collections import Counter
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 import numpy as np
-from packaging.utils import canonicalize_name
 
 from executive.cell.arm_config import FlangeConfig
 from executive.errors import InputError
 from executive.geometry import Array, Pose, rotate_about_z
-from executive.plugins import DISTRIBUTION, list_requirements
-from executive.text.files import has_outside_link, is_outside_path
+from executive.plugins import PACKAGE_PREFIX, find_package_file, find_package_folder
 from executive.text.findings import suggest_choice
 
-PACKAGE_PREFIX = "package:"
-"""Prefix of the name of a file in an installed Python package, as in `package:airo_models/arms/arm.urdf`."""
 DEFAULT_PACKAGE = "pybullet_data"
 """Package in whose folder a model without a package is searched."""
-ARMS_EXTRA = "arms"
-"""Extra with the packages of the models of shipped arms."""
-
-
-class WrongFlange(InputError):
-    """The URDF has no link with the name of the flange, or its z axis is not the axis of the last joint."""
-
-
 MAX_MODEL_SIZE = 20_000_000
 """Maximum size of a model file [byte], to limit the duration of the check."""
 MOVABLE_KINDS = ("revolute", "continuous")
@@ -62,6 +49,10 @@ _UNDECLARED_PREFIX = re.compile(r"(?<=[<\s/])(?!xmlns:)[A-Za-z_][\w.-]*:(?=[A-Za
 """Prefix of an element or attribute, as in `drake:acceleration`."""
 
 
+class WrongFlange(InputError):
+    """The URDF has no link with the name of the flange, or its z axis is not the axis of the last joint."""
+
+
 def find_model(name: str) -> Path:
     """Return the path of a model file, for an absolute path, `package:NAME/path` or a path in pybullet_data.
 
@@ -79,34 +70,6 @@ def find_model(name: str) -> Path:
     if os.path.getsize(path) > MAX_MODEL_SIZE:
         raise InputError(f"the model {name} is larger than {MAX_MODEL_SIZE // 1_000_000} MB")
     return Path(path).resolve()
-
-
-def find_package_file(reference: str) -> Path:
-    """Return the file `path` in the installed package `NAME`, for `package:NAME/path`, without an import.
-
-    Raises:
-        InputError: The package is not installed, the path leaves its folder, or the file does not exist.
-    """
-    name, _, path = reference.removeprefix(PACKAGE_PREFIX).partition("/")
-    folder = find_package_folder(name)
-    if folder is None:
-        advice = "install the package, or copy the model beside the file that names it"
-        if canonicalize_name(name) in list_requirements(ARMS_EXTRA):
-            command = f'uv sync --extra {ARMS_EXTRA}` or `pip install "{DISTRIBUTION}[{ARMS_EXTRA}]"'
-            advice = f"install it with `{command}`"
-        raise InputError(f'the package "{name}" of the model {reference} is not installed; {advice}')
-    if is_outside_path(path) or has_outside_link(folder, path):
-        raise InputError(f'"{reference}" leads out of the folder of the package "{name}"; name a file in it')
-    if not os.path.isfile(folder / path):
-        raise InputError(f'the package "{name}" has no file "{path}" in {folder}')
-    return folder / path
-
-
-def find_package_folder(name: str) -> Path | None:
-    """Return the folder of an installed Python package, which is not imported, or None."""
-    spec = importlib.util.find_spec(name) if name.isidentifier() else None
-    folders = (spec and spec.submodule_search_locations) or ()
-    return next(map(Path, folders), None)
 
 
 def read_robot(path: Path) -> Element:
@@ -221,11 +184,10 @@ class JointChain:
             frames.append(Pose(X_B.rotation @ rotate_about_z(angle), X_B.position))
         return [*frames, frames[-1] @ self.X_nF]
 
-    @cached_property
+    @property
     def reach(self) -> float:
         """Sum of the distances between joints, from the second joint to the flange [m]."""
-        offsets = [*self.offsets[2:], self.X_nF]
-        return float(sum(np.linalg.norm(offset.position) for offset in offsets))
+        return float(sum(np.linalg.norm(X.position) for X in (*self.offsets[2:], self.X_nF)))
 
 
 def locate_flange(flange: FlangeConfig) -> Pose:
@@ -275,8 +237,8 @@ def read_chain(urdf: str, flange: FlangeConfig) -> JointChain:
             offsets.append(Pose(X.rotation @ R_axis, X.position))
             moving.append(joint)
             X = Pose(R_axis.T, np.zeros(3))
-        if kind in MOVABLE_KINDS and joint.find("mimic") is not None:
-            kind = "moved by another joint (<mimic>)"
+            if joint.find("mimic") is not None:
+                kind = "moved by another joint (<mimic>)"
         if kind not in (*MOVABLE_KINDS, "fixed"):
             raise InputError(
                 f'the joint "{joint.get("name")}" of the model {name} is {kind or "without type"}; '
@@ -306,10 +268,9 @@ def _read_joints(path: Path, robot: Element, links: Collection[str]) -> dict[str
     for joint in robot.findall("joint"):
         for role in ("parent", "child"):
             if (link := _get_link(joint, role)) not in links:
-                problem = (
-                    f'the joint "{joint.get("name", "")}" of the model {path.name} has the {role} "{link}"'
-                )
-                raise InputError(f"{problem}, which is no link of the model; correct the {role}")
+                joint_name = f'the joint "{joint.get("name", "")}" of the model {path.name}'
+                problem = f'{joint_name} has the {role} "{link}", which is no link of the model'
+                raise InputError(f"{problem}; correct the {role}")
         child = _get_link(joint, "child")
         if child in joints:
             names = f'"{joints[child].get("name")}" and "{joint.get("name")}"'
@@ -356,9 +317,8 @@ def _add_side_branches(
 def _align_z(path: Path, joint: Element) -> Array:
     """Return a rotation `(3, 3)` whose z axis is the axis of a joint."""
     element = joint.find("axis")
-    axis = np.array(
-        parse_numbers(path, Element("axis") if element is None else element, "xyz", (1.0, 0.0, 0.0))
-    )
+    element = Element("axis") if element is None else element
+    axis = np.array(parse_numbers(path, element, "xyz", (1.0, 0.0, 0.0)))
     length = float(np.linalg.norm(axis))
     if not 1e-6 < length < 1e6:
         place = f'the joint "{joint.get("name")}" of the model {path.name}'
@@ -406,12 +366,12 @@ def _read_limits(path: Path, joint: Element) -> tuple[float, float, float, float
         lower = upper = math.nan
     place = f'the joint "{joint.get("name")}" of the model {path.name}'
     if max(abs(lower), abs(upper)) > MAX_JOINT_POSITION:
-        raise InputError(
-            f"{place} has the limits {lower:g} to {upper:g} rad; angles in a URDF are in radians"
-        )
+        problem = f"{place} has the limits {lower:g} to {upper:g} rad"
+        raise InputError(f"{problem}; angles in a URDF are in radians")
     if lower > upper:
         raise InputError(f"{place} has a lower limit of {lower:g} rad above its upper limit of {upper:g} rad")
-    velocity, effort = (values[key] if values[key] > 0 else math.nan for key in ("velocity", "effort"))
+    velocity = values["velocity"] if values["velocity"] > 0 else math.nan
+    effort = values["effort"] if values["effort"] > 0 else math.nan
     return lower, upper, velocity, effort
 
 
@@ -450,9 +410,8 @@ def propose_flange(urdf: str, link: str = "") -> FlangeConfig:
 
     counts = {name: count_joints(name) for name in links}
     longest = [name for name, count in counts.items() if count == max(counts.values(), default=0) > 0]
-    candidates = (
-        [link] if link else sorted(longest, key=lambda each: links[each].find("collision") is not None)
-    )
+    longest.sort(key=lambda each: links[each].find("collision") is not None)
+    candidates = [link] if link else longest
     error = InputError(f"the model {path.name} has no chain of revolute joints without branches")
     for rotation in FLANGE_ROTATIONS_DEG:
         for each in candidates:

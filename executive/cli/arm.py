@@ -75,8 +75,9 @@ def read_arm(file: str, flange: str = "", target: Path | None = None) -> tuple[A
     Raises:
         InputError: The file does not exist, or describes no arm that the executive can move.
     """
-    from executive.arms.urdf import PACKAGE_PREFIX, find_model
+    from executive.arms.urdf import find_model
     from executive.mission.arm_file import load_arm
+    from executive.plugins import PACKAGE_PREFIX
     from executive.station.arm_report import propose_arm
     from executive.text.files import get_shipped_folder, read_source
     from executive.text.findings import Source

@@ -202,10 +202,11 @@ def _write_project_with_arm(folder: Path, package: str, urdf: str, flange: str) 
     """
     import yaml
 
-    from executive.arms.urdf import PACKAGE_PREFIX, find_model
+    from executive.arms.urdf import find_model
     from executive.cli.arm import dump_yaml, read_arm
     from executive.motion.reach import find_fitting_speed
     from executive.physics.model_files import list_model_files
+    from executive.plugins import PACKAGE_PREFIX
 
     arm, text = read_arm(urdf, flange)
     layout, report = _choose_layout(arm)

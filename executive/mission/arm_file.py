@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 from pydantic import ValidationError
 
-from executive.arms.urdf import PACKAGE_PREFIX, JointChain, WrongFlange, read_chain
+from executive.arms.urdf import JointChain, WrongFlange, read_chain
 from executive.cell.arm_config import ArmFile, FlangeConfig, LimitsConfig
 from executive.errors import InputError
 from executive.geometry import Array
+from executive.plugins import PACKAGE_PREFIX
 from executive.text.files import describe_outside_path
 from executive.text.findings import Finding, MissionError, Source, make_error, sort_findings
 from executive.text.validate import KeyPath, find_span, join_keys, validate
@@ -65,21 +66,26 @@ def complete_arm(root: YamlMapping, folder: Path) -> tuple[YamlMapping, list[Fin
     return _insert_limits(root, limits, chain, urdf)
 
 
-def load_arm(source: Source, folder: Path) -> ArmFile:
-    """Return the content of an arm file in a folder, with the limits and the path of its URDF.
+def read_arm_file(source: Source, folder: Path) -> tuple[YamlMapping, ArmFile]:
+    """Return tree and content of an arm file in a folder, with the limits of its URDF.
 
     Raises:
         MissionError: The file has errors; the exception contains every finding.
     """
     root, findings = parse_yaml(source)
     arm: ArmFile | None = None
-    if isinstance(root, YamlMapping):
-        root, errors = complete_arm(root, folder)
-        findings += errors
+    if isinstance(root, YamlMapping) and not findings:
+        root, findings = complete_arm(root, folder)
     if root is not None and not findings:
         arm, findings = validate(root, ArmFile)
-    if arm is None or findings:
+    if arm is None or not isinstance(root, YamlMapping):
         raise MissionError(sort_findings(findings, source.path))
+    return root, arm
+
+
+def load_arm(source: Source, folder: Path) -> ArmFile:
+    """Return the content of an arm file with the path of its URDF; raise the error of `read_arm_file`."""
+    _, arm = read_arm_file(source, folder)
     return arm.model_copy(update={"urdf": _resolve_urdf(arm.urdf, folder)})
 
 

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
-from executive.arms.urdf import PACKAGE_PREFIX
-from executive.cell.arm_config import DEFAULT_ARM_FILE, ArmFile
+from executive.cell.arm_config import DEFAULT_ARM_FILE
 from executive.cell.config import BinConfig, CellConfig, ObjectConfig
 from executive.cell.objects import BIN_THICKNESS
 from executive.errors import InputError
 from executive.geometry import Array
-from executive.mission.arm_file import complete_arm
+from executive.mission.arm_file import read_arm_file
+from executive.plugins import PACKAGE_PREFIX
 from executive.text.files import describe_outside_path, find_file_below, read_source
 from executive.text.findings import Finding, MissionError, Source, Span, make_error, sort_findings
 from executive.text.validate import BASE_KEY, KeyPath, find_span, override_cell, validate
@@ -175,16 +175,10 @@ class _CellFileReader:
         source = self._read_named_file(file, "", "no-arm")
         if source is None:
             return None
-        arm_root, findings = parse_yaml(source)
-        self.findings += findings
-        if isinstance(arm_root, YamlMapping):
-            arm_root, errors = complete_arm(arm_root, self.paths[source].parent)
-            self.findings += errors
-            if errors:
-                return None
-        arm_file, errors = validate(arm_root, ArmFile) if arm_root else (None, [])
-        self.findings += errors
-        if arm_file is None or not isinstance(arm_root, YamlMapping):
+        try:
+            arm_root, arm_file = read_arm_file(source, self.paths[source].parent)
+        except MissionError as error:
+            self.findings += error.findings
             return None
         urdf = arm.get("urdf")
         if is_default and urdf is not None and urdf.python_value != arm_file.urdf:

@@ -127,8 +127,9 @@ def _solve_waypoints(kinematics: Kinematics, X_WT: Pose, length: float, branch: 
 
 def _find_turn_direction(kinematics: Kinematics, q: Array) -> float:
     """Return 1.0 if the last joint turns in the direction of the tool about the tool axis, otherwise -1.0."""
-    X_WT, X_WU = map(kinematics.compute_tool_pose, (q, np.append(q[:-1], q[-1] + 0.1)))
-    return float(np.sign((X_WT.inverse() @ X_WU).rotation[1, 0]))
+    X_WT = kinematics.compute_tool_pose(q)
+    X_WT_turned = kinematics.compute_tool_pose(np.append(q[:-1], q[-1] + 0.1))
+    return float(np.sign((X_WT.inverse() @ X_WT_turned).rotation[1, 0]))
 
 
 def _turn_last_joint(

@@ -15,7 +15,7 @@ import numpy as np
 import pybullet
 from pybullet_utils.bullet_client import BulletClient
 
-from executive.arms.urdf import find_model, locate_flange, read_chain
+from executive.arms.urdf import find_model, read_chain
 from executive.cell.arm_config import TOOL_LINK
 from executive.cell.config import BinConfig, CellConfig
 from executive.cell.device_config import STEP
@@ -56,7 +56,6 @@ class CellWorld:
         arm_urdf: URDF of this body.
         joints: Indices of the joints of the arm, which are also the indices of the links that they move.
         joint_counts: Number of joints before each link of the arm, by the index of the link; -1: the base.
-        flange_index: Index of the link with the flange.
         tool_index: Index of the link of the tool, whose frame is the frame of the flange.
         table, floor: Bodies of the table and of the floor under the table.
         bin_bodies: Body of each bin, by name.
@@ -86,9 +85,7 @@ class CellWorld:
         ]
         link_names = [info[LINK_NAME].decode() for info in infos]
         self._link_indices = {name: index for index, name in enumerate(link_names)}
-        self.flange_index = self.find_link(config.arm.flange.link)
         self.tool_index = self.find_link(TOOL_LINK)
-        self._X_LF = locate_flange(config.arm.flange)  # L is the frame of the link with the flange.
         chain = read_chain(config.arm.urdf, config.arm.flange)
         joint_names = [info[JOINT_NAME].decode() for info in infos]
         self.joints = [joint_names.index(name) for name in chain.joints]
@@ -124,8 +121,8 @@ class CellWorld:
 
     def get_flange_pose(self) -> Pose:
         """Return `X_WF`, the pose of the flange."""
-        state = self.client.getLinkState(self.arm, self.flange_index, computeForwardKinematics=True)
-        return Pose.of(*state[4:6]) @ self._X_LF
+        state = self.client.getLinkState(self.arm, self.tool_index, computeForwardKinematics=True)
+        return Pose.of(*state[4:6])
 
     def get_tool_pose(self) -> Pose:
         """Return `X_WT`, the pose of the tool centre point."""

@@ -20,9 +20,10 @@ import pybullet
 import pybullet_data
 from numpy.typing import ArrayLike, NDArray
 
-from executive.arms.urdf import find_model, find_package_folder, parse_numbers, read_origin, read_robot
+from executive.arms.urdf import find_model, parse_numbers, read_origin, read_robot
 from executive.errors import InputError
 from executive.geometry import Array, Pose
+from executive.plugins import find_package_folder
 from executive.text.files import get_shipped_folder, has_outside_link, is_outside_path, read_image_header
 
 MAX_TRIANGLE_COUNT = 20_000

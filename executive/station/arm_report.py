@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,32 +12,30 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.arms.urdf import JointChain, find_model, propose_flange, read_chain
+from executive.arms.urdf import JointChain, propose_flange, read_chain
 from executive.cell.arm import Goal
 from executive.cell.arm_config import ArmConfig, ArmFile
 from executive.cell.config import CellConfig
 from executive.errors import InputError, Unreachable
-from executive.geometry import Array, make_tool_down_pose
-from executive.motion.configurations import COARSE_ANGLE_STEP, find_configuration_pairs
+from executive.geometry import Array
+from executive.motion.configurations import find_configuration_pairs
 from executive.motion.joints import Kinematics, build_planning_kinematics
 from executive.motion.reach import RADIUS_STEP, WORKSPACE, Reach, format_bin, measure_reach
 from executive.station.camera import CellCamera, Robot
 from executive.station.check import StillRobot, find_payload_errors
 
-DEFAULT_ACCELERATION = 5.0
-"""Proposed joint acceleration [rad/s²], which the torques of the arms UR5e, xArm6 and Panda permit."""
-JERK_TIME = 0.1
-"""Proposed time from rest to full acceleration [s]."""
-DEFAULT_SOURCE = (
-    "Position, velocity and effort: the URDF. Acceleration: {acceleration:g} rad/s², cautious for arms of "
-    "this size; replace it by the value of the data sheet. Jerk: ten times the acceleration. Braking: 1.2 "
-    "times the acceleration, and twice the jerk."
-)
-"""Source of proposed limits."""
+PROPOSED_LIMITS: Mapping[str, str | float] = {
+    "source": "Position, velocity and effort: the URDF. Acceleration: 5 rad/s², cautious for arms of this "
+    "size; replace it by the value of the data sheet. Jerk: ten times the acceleration. Braking: 1.2 times "
+    "the acceleration, and twice the jerk.",
+    "acceleration": 5.0,
+    "jerk": 50.0,
+    "stop_acceleration": 6.0,
+    "stop_jerk": 100.0,
+}
+"""Limits of a new arm file [rad/s², rad/s³], which the torques of the arms UR5e, xArm6 and Panda permit."""
 COMPARED_POSE_COUNT = 40
 """Number of tool poses for which an analytic solver is compared with the numerical one."""
-SAME_SOLUTION = 0.01
-"""Maximum difference between two equal solutions in a joint [rad]."""
 POSE_GRID = (np.linspace(-0.1, 0.7, 9), np.linspace(-0.6, 0.6, 13), (0.05, 0.2, 0.35))
 """Positions of the tool for proposed poses: x and y from the base, z from the travel height [m]."""
 TURN_WEIGHT = 1e-3
@@ -57,7 +55,7 @@ class ArmReport:
     Attributes:
         config: The cell with the arm.
         chain: Joints of the arm.
-        solver: Name of the solver, and how many solutions of the numerical search it finds.
+        solver: Name of the solver, and how many poses it reaches, compared with the numerical search.
         reach: Reach of the arm.
         pairs: Names of the links that can collide with each other.
         poses_deg: Proposed joint positions by name [degree]: `home`, and `aside` on the other side.
@@ -77,32 +75,13 @@ def propose_arm(urdf: str, name: str, flange_link: str = "") -> dict[str, Any]:
     """Return the content of an arm file for a URDF, with cautious accelerations.
 
     Raises:
-        InputError: The URDF describes no arm, or lacks limits; the message names the joint.
+        InputError: The URDF describes no arm; the message names the link or joint.
     """
     flange = propose_flange(urdf, flange_link)
-    chain = read_chain(urdf, flange)
-    limits = {"positions": chain.lower + chain.upper, "velocity": chain.velocity, "effort": chain.effort}
-    for kind, values in limits.items():
-        if np.isnan(values).any():
-            joint = chain.joints[int(np.argmax(np.isnan(values)))]
-            problem = f'the joint "{joint}" of the model {find_model(urdf).name} has no limits of {kind}'
-            raise InputError(f"{problem}; complete its <limit> in the URDF, or the keys of an arm file")
     flange_entry: dict[str, Any] = {"link": flange.link}
     if any(flange.rotation_deg):
         flange_entry["rotation_deg"] = [round(angle) for angle in flange.rotation_deg]
-    acceleration = DEFAULT_ACCELERATION
-    return {
-        "arm": name,
-        "urdf": urdf,
-        "flange": flange_entry,
-        "limits": {
-            "source": DEFAULT_SOURCE.format(acceleration=acceleration),
-            "acceleration": acceleration,
-            "jerk": acceleration / JERK_TIME,
-            "stop_acceleration": 1.2 * acceleration,
-            "stop_jerk": 2 * acceleration / JERK_TIME,
-        },
-    }
+    return {"arm": name, "urdf": urdf, "flange": flange_entry, "limits": dict(PROPOSED_LIMITS)}
 
 
 def place_arm(cell: CellConfig, arm: ArmFile, base: Sequence[float] = (0.0, 0.0, 0.0)) -> CellConfig:
@@ -130,18 +109,11 @@ def report_arm(config: CellConfig) -> ArmReport:
         poses_deg = propose_poses(config, kinematics, checker)
         get_name = checker.world.get_link_name
         pairs = [(get_name(a), get_name(b)) for a, b in checker.self_collision_pairs]
-        posed = _with_poses(config, poses_deg)
-        problems = [message for _, message in find_payload_errors(posed, checker.world)]
+        problems = [message for _, message in find_payload_errors(config, checker.world, poses_deg)]
     if not poses_deg:
         problems.append("no pose keeps the arm clear of everything and out of the view of the camera")
     solver = _describe_solver(config, kinematics)
     return ArmReport(config, chain, solver, reach, pairs, poses_deg, problems)
-
-
-def _with_poses(config: CellConfig, poses_deg: dict[str, list[float]]) -> CellConfig:
-    poses = {name: tuple(pose) for name, pose in poses_deg.items()}
-    arm = config.arm.model_copy(update={"poses_deg": {**config.arm.poses_deg, **poses}})
-    return config.model_copy(update={"arm": arm})
 
 
 def propose_poses(config: CellConfig, kinematics: Kinematics, checker: Any) -> dict[str, list[float]]:
@@ -194,32 +166,21 @@ def _rate_configuration(kinematics: Kinematics, q: Array, lower: Array, upper: A
 def _describe_solver(config: CellConfig, kinematics: Kinematics) -> str:
     """Return the name of the solver; of an analytic one, with its coverage against the numerical search."""
     name = str(getattr(kinematics, "solver_name", config.arm.solver))
-    if name != "eaik":
+    if name == "numeric":
         return name
     numeric_arm = config.arm.model_copy(update={"solver": "numeric"})
     numeric = build_planning_kinematics(config.model_copy(update={"arm": numeric_arm}))
     base = np.array(config.arm.base.position)
     rng = np.random.default_rng(0)
-    counts = np.zeros(2, dtype=int)  # found solutions, and all solutions of the numerical search
-    q_seed = np.zeros(config.arm.joint_count)
+    counts = {kinematics: 0, numeric: 0}
     for _ in range(COMPARED_POSE_COUNT):
-        offset = rng.uniform((0.2, -0.5, 0.05), (0.8, 0.5, 0.4))
-        poses = [make_tool_down_pose(base + offset)]
-        qs_by_solver = []
-        for solver in (kinematics, numeric):
-            try:
-                (qs,), _ = solver.solve_all(poses, q_seed, COARSE_ANGLE_STEP)
-                qs_by_solver.append(qs[solver.joint_range.contains(qs)])
-            except Unreachable:
-                qs_by_solver.append(np.zeros((0, len(q_seed))))
-        found, expected = qs_by_solver
-        if config.arm.joint_count > 6:  # A redundant arm has infinitely many solutions.
-            counts += (len(found) > 0, len(expected) > 0)
-            continue
-        differences = np.abs(np.sin((expected[:, None] - found) / 2)).max(axis=2, initial=0.0)
-        counts += (int((differences.min(axis=1, initial=1.0) < SAME_SOLUTION).sum()), len(expected))
-    noun = "poses" if config.arm.joint_count > 6 else "solutions"
-    return f"eaik ({counts[0]} of the {counts[1]} {noun} that the numerical search finds)"
+        x, y, z = (base + rng.uniform((0.2, -0.5, 0.05), (0.8, 0.5, 0.4))).tolist()
+        for solver in counts:
+            with contextlib.suppress(Unreachable):
+                find_configuration_pairs(solver, Goal((x, y, z)), 0.0, np.zeros(config.arm.joint_count))
+                counts[solver] += 1
+    found, expected = counts.values()
+    return f"{name}, which reaches {found} of {COMPARED_POSE_COUNT} poses (numerical search: {expected})"
 
 
 def draw_reach(report: ArmReport) -> NDArray[np.uint8]:
@@ -241,9 +202,9 @@ def draw_reach(report: ArmReport) -> NDArray[np.uint8]:
     is_reached = np.isin(np.round(distances / RADIUS_STEP), np.round(report.reach.radii / RADIUS_STEP))
     image[is_reached] = (214, 236, 214)
 
-    def write(text: str, point: Sequence[float] | Array, colour: tuple[int, int, int] = DARK) -> None:
+    def write(text: str, point: Sequence[float] | Array) -> None:
         column, row = to_pixel(point)
-        cv2.putText(image, text, (column + 10, row), cv2.FONT_HERSHEY_SIMPLEX, 0.45, colour, 1, cv2.LINE_AA)
+        cv2.putText(image, text, (column + 10, row), cv2.FONT_HERSHEY_SIMPLEX, 0.45, DARK, 1, cv2.LINE_AA)
 
     low_corner, high_corner = np.array([config.table.x, config.table.y]).T
     cv2.rectangle(image, to_pixel(low_corner), to_pixel(high_corner), DARK, 2)

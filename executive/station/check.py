@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -120,11 +120,13 @@ def find_pose_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
                 margin = f"the minimum clearance is {config.motion.margin:.3f} m"
                 message = f'the pose "{name}" brings {violation}; {margin}'
                 yield ("arm", "poses_deg", name), message
-        yield from find_payload_errors(config, checker.world)
+        yield from find_payload_errors(config, checker.world, config.arm.poses_deg)
         yield from _find_occluding_poses_and_bins(config, checker.world)
 
 
-def find_payload_errors(config: CellConfig, world: CellWorld) -> Iterator[tuple[KeyPath, str]]:
+def find_payload_errors(
+    config: CellConfig, world: CellWorld, poses_deg: Mapping[str, Sequence[float]]
+) -> Iterator[tuple[KeyPath, str]]:
     """Yield key and message for each pose in which a joint cannot hold arm, tool and the heaviest class.
 
     The torque of each joint is that of the weight of all links, of the tool, and of an object at the tool.
@@ -132,7 +134,7 @@ def find_payload_errors(config: CellConfig, world: CellWorld) -> Iterator[tuple[
     kinematics = build_kinematics(config)
     mass = max((section.mass or 0.0 for section in config.objects.values()), default=0.0)
     efforts = np.array(config.arm.effort)
-    for name, pose in config.arm.poses_deg.items():
+    for name, pose in poses_deg.items():
         q = np.radians(pose)
         still = [0.0] * len(pose)
         torques = np.array(world.client.calculateInverseDynamics(world.arm, q.tolist(), still, still))

@@ -16,16 +16,18 @@ import pytest
 from at_terminal import invoke
 from PIL import Image
 
-from executive.arms import urdf
-from executive.arms.urdf import find_model, find_package_folder
+from executive import plugins
+from executive.arms.urdf import find_model
 from executive.cell.arm_config import BaseConfig
 from executive.cell.config import CellConfig
+from executive.errors import InputError
 from executive.geometry import Pose
 from executive.mission.cell_file import load_cell
 from executive.motion.joints import build_planning_kinematics
 from executive.motion.reach import find_braking_errors, find_places_out_of_reach, measure_reach
 from executive.physics.arm_model import ArmHulls
 from executive.physics.cell_world import CellWorld
+from executive.plugins import find_package_folder
 from executive.station.check import find_payload_errors
 from executive.text.files import get_shipped_folder
 
@@ -122,10 +124,11 @@ def test_a_descent_from_which_the_arm_cannot_stop_in_time_is_an_error(xarm6: Cel
 
 def test_joints_too_weak_for_the_load_are_an_error(xarm6: CellConfig) -> None:
     world = CellWorld(xarm6, visuals=False)
-    assert not list(find_payload_errors(xarm6, world))
+    poses = xarm6.arm.poses_deg
+    assert not list(find_payload_errors(xarm6, world, poses))
     cube = xarm6.objects["cube"].model_copy(update={"mass": 9.0})
     heavy = xarm6.model_copy(update={"objects": {"cube": cube}})
-    messages = dict(find_payload_errors(heavy, world))
+    messages = dict(find_payload_errors(heavy, world, poses))
     world.close()
     assert re.match(
         r"joint \d needs [\d.]+ Nm to hold arm, tool and 9 kg", messages["arm", "poses_deg", "home"]
@@ -162,9 +165,9 @@ def test_the_hulls_hide_the_pixels_of_the_arm_and_little_more(name: str) -> None
 def test_a_model_in_a_package_stays_in_its_folder(monkeypatch: pytest.MonkeyPatch) -> None:
     name = "package:pybullet_data/xarm/xarm6_robot.urdf"
     assert find_model(name) == find_model("xarm/xarm6_robot.urdf")
-    monkeypatch.setattr(urdf, "find_package_folder", lambda name: None)
+    monkeypatch.setattr(plugins, "find_package_folder", lambda name: None)
     monkeypatch.setattr(importlib.metadata, "requires", lambda _: ['pybullet-data; extra == "arms"'])
-    with pytest.raises(urdf.InputError, match="`uv sync --extra arms` or `pip install"):
+    with pytest.raises(InputError, match="`uv sync --extra arms` or `pip install"):
         find_model(name)
     monkeypatch.undo()
     for reference, message in (
@@ -174,5 +177,5 @@ def test_a_model_in_a_package_stays_in_its_folder(monkeypatch: pytest.MonkeyPatc
         ("package:os.path/a.urdf", "is not installed"),
         ("package:pybullet_data/a.urdf", 'has no file "a.urdf"'),
     ):
-        with pytest.raises(urdf.InputError, match=message):
+        with pytest.raises(InputError, match=message):
             find_model(reference)
