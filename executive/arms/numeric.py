@@ -52,8 +52,10 @@ CELL_SIZES = {6: 1.0, 7: 0.5}
 """Size of the cells of the joint space [rad], by number of joints; a search has one start in each cell."""
 MAX_START_EXCESS = 0.3
 """Maximum distance of a start from the range of the joints [rad]."""
-COARSE_ANGLE_STEP = math.radians(2.0)
-"""Distance between redundancy angles below which a search is the second one [rad]."""
+RANGE_MARGIN = 1e-3
+"""Distance from the ends of its range to which a joint returns in a second search [rad]."""
+MAX_FINE_ANGLE_STEP = math.radians(2.0)
+"""Distance between redundancy angles at or below which a search is the second one [rad]."""
 SAME_SOLUTION_TOLERANCE = 2e-3
 """Maximum difference between two equal solutions, in sine and cosine of each joint."""
 
@@ -140,6 +142,10 @@ class ChainKinematics:
         is_near = excess < MAX_START_EXCESS
         start_qs = start_qs[is_near] if is_near.any() else start_qs
         qs, is_solved = self._approach(start_qs, poses[-1:], SEARCH_STEP_COUNT)
+        if angle_step <= MAX_FINE_ANGLE_STEP:
+            further_qs, is_further_solved = self._approach(start_qs, poses[-1:], returns_to_range=True)
+            qs = np.vstack([qs, further_qs])
+            is_solved = np.append(is_solved, is_further_solved)
         if not is_solved.any():
             raise self._make_unreachable_error(poses[-1].position)
         qs = self._remove_turns(self._select_different(qs[is_solved]), seed)
@@ -176,7 +182,7 @@ class ChainKinematics:
         direction = rotate_about_z(-azimuth) @ X_1T.rotation[:, 2]
         table_qs, places, cells = self._get_table(*np.round(direction / DIRECTION_STEP).tolist())
         distances = (places[0] - math.hypot(x, y)) ** 2 + (places[1] - z) ** 2
-        count = START_COUNTS[self._size][int(angle_step < COARSE_ANGLE_STEP)]
+        count = START_COUNTS[self._size][int(angle_step <= MAX_FINE_ANGLE_STEP)]
         nearest = np.argsort(distances)[:count]
         start_qs = table_qs[nearest[np.unique(cells[nearest], return_index=True)[1]]]
         start_qs[:, 0] += azimuth
@@ -236,15 +242,22 @@ class ChainKinematics:
         return np.where((is_solved & is_near)[:, None], next_qs, np.nan)
 
     def _approach(
-        self, start_qs: Array, poses: Sequence[Pose], step_count: int = MAX_STEP_COUNT
+        self,
+        start_qs: Array,
+        poses: Sequence[Pose],
+        step_count: int = MAX_STEP_COUNT,
+        returns_to_range: bool = False,
     ) -> tuple[Array, NDArray[np.bool_]]:
         """Move configurations `(B, n)` [rad] by Newton steps to `B` poses, or all to one pose.
+
+        If `returns_to_range`, a redundant arm also moves joints that are out of their range back into it.
 
         Returns:
             The configurations, and the mask `(B,)` of those that reach their pose.
         """
         qs = start_qs.copy()
         is_solved = np.zeros(len(qs), dtype=bool)
+        inner_range = self.joint_range.shrink(RANGE_MARGIN)
         rows = np.flatnonzero(~np.isnan(qs[:, 0]))
         # All vectors are in the frame of the goal. The frame `world` consists of three axes and the origin.
         rotations = np.array([pose.rotation for pose in poses]).reshape(-1, 3, 3)
@@ -262,6 +275,10 @@ class ChainKinematics:
             levers[:, 1] = z
             jacobian = _cross(axes, levers).reshape(len(axes), 6, -1)[:, :5]
             change = _solve_least_squares(jacobian, error)
+            if returns_to_range:
+                way_back = (np.clip(qs[rows], *inner_range) - qs[rows])[:, :-1].T
+                change += way_back
+                change -= _solve_least_squares(jacobian, np.sum(jacobian * way_back[:, None], axis=0))
             change *= np.minimum(1.0, MAX_NEWTON_STEP / np.maximum(np.abs(change).max(axis=0), 1e-12))
             # The last joint turns the x axis of the tool to that of the goal; the other joints turn it, too.
             turn = -np.arctan2(x[1], x[0]) - np.sum(axes[:, 2] * change, axis=0)

@@ -18,7 +18,7 @@ from executive.cell.config import CellConfig
 from executive.errors import InputError, Unreachable
 from executive.geometry import Array, Pose, make_tool_down_pose, rotate_about_z
 from executive.mission.cell_file import load_cell
-from executive.motion.configurations import COARSE_ANGLE_STEP
+from executive.motion.configurations import COARSE_ANGLE_STEP, FINE_ANGLE_STEP
 from executive.motion.joints import Kinematics, wrap_angles
 from executive.physics.cell_world import CellWorld
 from executive.text.files import get_shipped_folder
@@ -184,8 +184,17 @@ def test_solutions_beyond_half_a_turn_are_found_within_asymmetric_limits() -> No
 
 
 @pytest.mark.parametrize("solver", ["eaik", "numeric"])
+def test_a_second_search_finds_a_solution_with_three_joints_at_the_ends_of_their_ranges(solver: str) -> None:
+    kinematics = build("panda", solver)
+    goal = kinematics.compute_tool_pose([-2.2067, -0.517, 0.3086, -3.0439, -2.8767, 3.7523, -0.449])
+    (qs,), _ = kinematics.solve_all([goal], get_home("panda"), FINE_ANGLE_STEP)
+    assert kinematics.joint_range.without_last().contains(qs[:, :-1]).any()
+
+
+@pytest.mark.parametrize("solver", ["eaik", "numeric"])
 def test_the_other_solvers_agree_with_that_of_the_iiwa(solver: str) -> None:
-    special, kinematics = build("overhead", "iiwa14"), build("overhead", solver)
+    special = build("overhead", "iiwa14")
+    kinematics = build("overhead", solver)
     home = get_home("overhead")
     for goal in list_goals("overhead")[:3]:
         qs, special_qs = (find_in_range(solver, goal, home) for solver in (kinematics, special))

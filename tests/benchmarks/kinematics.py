@@ -99,14 +99,17 @@ class ExhaustiveSearch:
     def compute_errors(self, qs: Array, pose: Pose) -> tuple[Array, Array]:
         """Return the pose errors `(B, 6)` [m, rad] of configurations `(B, n)` [rad], and the Jacobians."""
         X = Pose(np.broadcast_to(np.eye(3), (len(qs), 3, 3)), np.zeros((len(qs), 3)))
-        axes, origins = [], []
+        axes = []
+        origins = []
         for offset, angles in zip(self._offsets, qs.T, strict=True):
             p = X.position + X.rotation @ offset.position
             R = X.rotation @ offset.rotation
             axes.append(R[:, :, 2])
             origins.append(p)
-            x, y = R[:, :, 0], R[:, :, 1]
-            c, s = np.cos(angles)[:, None], np.sin(angles)[:, None]
+            x = R[:, :, 0]
+            y = R[:, :, 1]
+            c = np.cos(angles)[:, None]
+            s = np.sin(angles)[:, None]
             X = Pose(np.stack([c * x + s * y, c * y - s * x, R[:, :, 2]], axis=2), p)
         p = X.position + X.rotation @ self._X_nT.position
         R = X.rotation @ self._X_nT.rotation
