@@ -166,12 +166,12 @@ class _FailedRun:
         return replace(history.look, attempts=items.changes[self.item].attempts)
 
     def find_picture_file(self, run_folder: Path) -> str:
-        """Return the path of the picture of the failure, else of the last selection of the item, else ""."""
+        """Return the path in `run_folder` of the picture of the failure, else of the last selection, else ""."""
         failed = self.timeline.failures.get(self.item) if self.lost_items else self.deciding_activation
         folder = RunDirectory(run_folder).pictures
         file = find_picture(folder, self.item, failed.reason if failed is not None else "")
         file = file or find_picture(folder, self.item, "")
-        return file.relative_to(run_folder).as_posix() if file else ""
+        return f"{folder.name}/{file.name}" if file else ""
 
 
 def _find_nodes_on_path(tree: Node, path: str) -> list[Node]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import pytest
 from failed_runs import PICK, FailedRun
@@ -95,3 +96,15 @@ def test_a_fault_says_where_it_was_raised_and_what_is_known_of_the_arm(at_rest, 
     assert story.advice[0].startswith(first)
     assert re.fullmatch(r"record/test_diagnosis\.py:\d+, in broken", story.raised_at)
     assert story.node.path == "tree/5:retry/do/Grasp"
+
+
+def test_the_picture_is_named_relative_to_a_relative_run_directory() -> None:
+    run = FailedRun(PICK, objects=CUBE)
+
+    def stop() -> bool:
+        raise KeyboardInterrupt
+
+    run.fake.tool.can_hold = stop
+    Path("frames").mkdir()
+    Path("frames/000425_cube-1.jpg").touch()
+    assert run.tell().picture == "frames/000425_cube-1.jpg"
