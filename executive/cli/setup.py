@@ -210,14 +210,18 @@ def _write_project_with_arm(folder: Path, package: str, urdf: str, flange: str) 
 
     arm, text = read_arm(urdf, flange)
     layout, report = _choose_layout(arm)
+    # The cell also looks from `aside`.
+    poses_deg = {"aside": report.poses_deg["home"], **report.poses_deg}
+    arm_config = report.config.arm.model_copy(update={"poses_deg": poses_deg})
     sections: dict[str, Any] = {
         "arm": {
             "file": f"arms/{arm.arm}.yaml",
-            "base": {"position": [*report.config.arm.base.position]},
-            # The cell also looks from `aside`.
-            "poses_deg": {"aside": report.poses_deg["home"], **report.poses_deg},
+            "base": {"position": [*arm_config.base.position]},
+            "poses_deg": poses_deg,
         },
-        "motion": {"descent_speed": find_fitting_speed(report.config)},
+        "motion": {
+            "descent_speed": find_fitting_speed(report.config.model_copy(update={"arm": arm_config}))
+        },
     }
     files = write_project(folder, package, layout, {"name": arm.arm, "sections": dump_yaml(sections)})
     arms = folder / "cells" / "arms"

@@ -28,7 +28,7 @@ from executive.motion.reach import find_braking_errors, find_places_out_of_reach
 from executive.physics.arm_model import ArmHulls
 from executive.physics.cell_world import CellWorld
 from executive.plugins import find_package_folder
-from executive.station.check import find_payload_errors
+from executive.station.check import find_payload_errors, load_checker
 from executive.text.files import get_shipped_folder
 
 SHIPPED = get_shipped_folder()
@@ -99,6 +99,19 @@ def test_the_guide_leads_from_a_urdf_to_sorted_objects(model: Path) -> None:
     value = json.loads(result.stdout)
     assert (value["status"], value["items"]["placed"]) == ("SUCCESS", value["items"]["seen"])
     assert value["audit"]["agrees"] and value["items"]["placed"] >= 3
+
+
+def check_project(*words: str) -> list[str]:
+    """Create a project with an arm, and return the errors that the check finds in its cell."""
+    result = invoke("init", "hall", *words)
+    assert result.exit_code == 0, result.output
+    path = Path("hall/cells/table.yaml")
+    return [message for _, message in load_checker("sim").check(load_cell(path), path.parent)]
+
+
+@pytest.mark.slow
+def test_the_cell_of_a_new_project_passes_its_check(model: Path) -> None:
+    assert check_project("--urdf", "kuka_iiwa/model.urdf", "--flange", "lbr_iiwa_link_7") == []
 
 
 def test_places_out_of_reach_have_an_advice_that_helps(xarm6: CellConfig) -> None:
