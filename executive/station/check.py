@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from executive.cell.config import CellConfig, ObjectConfig
 from executive.cell.devices import CameraImage, DriverKind, is_rehearsal, load_driver_kind
 from executive.cell.frame import Box
+from executive.errors import InputError
 from executive.geometry import GRAVITY, Array, Pose
 from executive.motion.joints import build_kinematics, find_arm_errors
 from executive.motion.reach import find_braking_errors, find_places_out_of_reach
@@ -132,7 +133,11 @@ def find_payload_errors(
     The torque of each joint is that of the weight of all links, of the tool, and of an object at the tool.
     """
     kinematics = build_kinematics(config)
-    mass = max((section.mass or 0.0 for section in config.objects.values()), default=0.0)
+    checker = load_checker(config.kind)
+    mass = 0.0
+    for section in config.objects.values():
+        with contextlib.suppress(InputError):  # The driver reports an invalid model.
+            mass = max(mass, checker.compute_mass(section))
     efforts = np.array(config.arm.effort)
     for name, pose in poses_deg.items():
         q = np.radians(pose)

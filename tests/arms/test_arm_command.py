@@ -135,17 +135,19 @@ def test_a_descent_from_which_the_arm_cannot_stop_in_time_is_an_error(xarm6: Cel
     )
 
 
-def test_joints_too_weak_for_the_load_are_an_error(xarm6: CellConfig) -> None:
+def test_joints_too_weak_for_the_load_are_an_error(xarm6: CellConfig, tmp_path: Path) -> None:
     world = CellWorld(xarm6, visuals=False)
     poses = xarm6.arm.poses_deg
     assert not list(find_payload_errors(xarm6, world, poses))
-    cube = xarm6.objects["cube"].model_copy(update={"mass": 9.0})
-    heavy = xarm6.model_copy(update={"objects": {"cube": cube}})
-    messages = dict(find_payload_errors(heavy, world, poses))
+    model = tmp_path / "cube.urdf"
+    model.write_text('<robot name="cube"><link><inertial><mass value="9"/></inertial></link></robot>')
+    for change in ({"mass": 9.0}, {"urdf": str(model)}):
+        cube = xarm6.objects["cube"].model_copy(update=change)
+        heavy = xarm6.model_copy(update={"objects": {"cube": cube}})
+        messages = dict(find_payload_errors(heavy, world, poses))
+        message = messages["arm", "poses_deg", "home"]
+        assert re.match(r"joint \d needs [\d.]+ Nm to hold arm, tool and 9 kg", message)
     world.close()
-    assert re.match(
-        r"joint \d needs [\d.]+ Nm to hold arm, tool and 9 kg", messages["arm", "poses_deg", "home"]
-    )
 
 
 @pytest.mark.parametrize("name", ["overhead", "xarm6", "panda"])
