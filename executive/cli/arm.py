@@ -30,7 +30,11 @@ LINE_WIDTH = 100
 @click.option("--flange", default="", help="Link of the URDF at the flange; by default, one is proposed.")
 @click.option("--cell", default=DEFAULT_CELL, help="Cell file or shipped cell with table, bins and tool.")
 @click.option(
-    "--base", type=(float, float, float), metavar="X Y Z", help="Position of the base in the cell [m]."
+    "--base",
+    type=(float, float, float),
+    default=(0.0, 0.0, 0.0),
+    metavar="X Y Z",
+    help="Position of the base in the cell [m].",
 )
 @click.option("--write", "target", type=shared.FILE, help="Arm file to write, beside the URDF or above it.")
 @click.option("--picture", type=shared.FILE, help="File (.png) for a picture of the reach, from above.")
@@ -39,7 +43,7 @@ def arm_command(
     file: str,
     flange: str,
     cell: str,
-    base: tuple[float, float, float] | None,
+    base: tuple[float, float, float],
     target: Path | None,
     picture: Path | None,
     as_json: bool,
@@ -50,13 +54,17 @@ def arm_command(
     that can collide with each other, and proposed poses. Exit code 2 if the executive cannot move the arm.
     """
     with shared.keep_stdout_clean():
+        from executive.cell.device_config import MAX_LENGTH
         from executive.mission.cell_file import load_cell
         from executive.station.arm_report import draw_reach, place_arm, report_arm
         from executive.text.files import find_cell
 
+        if not all(abs(coordinate) <= MAX_LENGTH for coordinate in base):  # NaN is in no range.
+            limits = f"write three numbers from {-MAX_LENGTH:g} to {MAX_LENGTH:g} m"
+            raise InputError(f"--base {' '.join(map(str, base))} is no position of an arm; {limits}")
         arm, text = read_arm(file, flange, target)
         cell_config = load_cell(find_cell(cell))
-        report = report_arm(place_arm(cell_config, arm, base or (0.0, 0.0, 0.0)))
+        report = report_arm(place_arm(cell_config, arm, base))
         if target is not None:
             with explain_os_errors(InputError, f"{target} cannot be written", "name a writable file"):
                 target.write_text(text, encoding="utf-8")

@@ -78,6 +78,8 @@ def test_what_is_no_arm_is_refused_with_the_link_or_joint(model: Path) -> None:
         (("cube.urdf",), "the model cube.urdf has no chain of revolute joints"),
         ((str(model), "--flange", "link_base"), 'has 0 joint(s) up to the link "link_base"'),
         (("nothing.urdf",), "there is no model nothing.urdf"),
+        ((str(model), "--base", "nan", "0", "0"), "--base nan 0.0 0.0 is no position of an arm; write three"),
+        ((str(model), "--base", "0", "-1e9", "0"), "write three numbers from -10 to 10 m"),
         ((str(model), "--write", "elsewhere/arm.yaml"), "outside of its folder"),
     ):  # fmt: skip
         Path("elsewhere").mkdir(exist_ok=True)
