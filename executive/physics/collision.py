@@ -314,7 +314,10 @@ def _search_pairs(
     near_counts = dict.fromkeys(pairs, 0)
     touch_counts = dict.fromkeys(pairs, 0)
     rng = np.random.default_rng(0)
-    lower, upper = np.radians(ranges_deg).T.clip(-math.pi, math.pi)
+    ranges = np.radians(ranges_deg).T
+    # A revolution is enough: ±180°, or, if the middle of the range is beyond, the one about 180° or -180°.
+    centres = np.trunc(ranges.mean(axis=0) / math.pi) * math.pi
+    lower, upper = ranges.clip(centres - math.pi, centres + math.pi)
     for q in rng.uniform(lower, upper, (SAMPLE_COUNT, len(lower))):
         client.resetJointStatesMultiDof(arm, joints, [[angle] for angle in q])
         for pair in pairs:

@@ -14,10 +14,12 @@ import pytest
 from executive.behaviours import load_skills
 from executive.cell.arm import Goal
 from executive.geometry import make_tool_down_pose
+from executive.mission.cell_file import load_cell
 from executive.mission.load import load_mission
 from executive.motion.configurations import find_configuration_pairs
 from executive.motion.joints import build_kinematics
 from executive.physics.cell_world import CellWorld
+from executive.physics.collision import find_self_collision_pairs
 from executive.station.check import load_checker
 from executive.text.findings import MissionError
 
@@ -379,3 +381,19 @@ def test_a_urdf_in_an_installed_package_names_files_in_the_package_only(
     path.write_text(change_mesh("../meshes/link_4.stl"))
     (finding,) = check()
     assert 'names the file "../meshes/link_4.stl", which is outside of its folder' in finding
+
+
+def test_links_can_collide_in_the_same_poses_after_a_whole_turn() -> None:
+    write_project(change_3(LIMIT_3, LIMIT_3.replace('-2.93"', '-2.98"').replace('"2.93"', '"-0.08"')))
+    pairs = []
+    for turn in (0.0, 360.0):
+        config = load_cell(Path("cells/bench.yaml"))
+        lower, upper = np.array(config.arm.limits.position_ranges_deg).T
+        lower[2] += turn
+        upper[2] += turn
+        changes = {"min_position_deg": tuple(lower), "position_deg": tuple(upper)}
+        limits = config.arm.limits.model_copy(update=changes)
+        arm = config.arm.model_copy(update={"limits": limits})
+        with contextlib.closing(CellWorld(config.model_copy(update={"arm": arm}), visuals=False)) as world:
+            pairs.append(find_self_collision_pairs(world))
+    assert pairs[0] == pairs[1]
