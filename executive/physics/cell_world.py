@@ -84,9 +84,10 @@ class CellWorld:
             self.client.getJointInfo(self.arm, index) for index in range(self.client.getNumJoints(self.arm))
         ]
         link_names = [info[LINK_NAME].decode() for info in infos]
-        self._link_indices = {name: index for index, name in enumerate(link_names)}
-        self.tool_index = self.find_link(TOOL_LINK)
         chain = read_chain(config.arm.urdf, config.arm.flange)
+        # The first link of the chain is the base.
+        self._link_names = [next(iter(chain.places)), *link_names]
+        self.tool_index = self.find_link(TOOL_LINK)
         joint_names = [info[JOINT_NAME].decode() for info in infos]
         self.joints = [joint_names.index(name) for name in chain.joints]
         counts = {name: count for name, (count, _) in chain.places.items()} | {TOOL_LINK: len(self.joints)}
@@ -96,11 +97,11 @@ class CellWorld:
 
     def find_link(self, name: str) -> int:
         """Return the index of a link of the arm, by its name in the URDF; -1 for the base."""
-        return self._link_indices.get(name, -1)
+        return self._link_names.index(name) - 1
 
     def get_link_name(self, link: int) -> str:
         """Return the name of a link of the arm in the URDF, by its index."""
-        return next((name for name, index in self._link_indices.items() if index == link), "base")
+        return self._link_names[link + 1]
 
     def name_link(self, link: int) -> str:
         """Return the name of a link of the arm for messages, by its index."""

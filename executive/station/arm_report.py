@@ -23,6 +23,7 @@ from executive.motion.joints import Kinematics, build_planning_kinematics
 from executive.motion.reach import RADIUS_STEP, WORKSPACE, Reach, format_bin, measure_reach
 from executive.station.camera import CellCamera, Robot
 from executive.station.check import StillRobot, find_payload_errors
+from executive.text.validate import join_keys
 
 PROPOSED_LIMITS: Mapping[str, str | float] = {
     "source": "Position, velocity and effort: the URDF. Acceleration: 5 rad/s², cautious for arms of this "
@@ -101,7 +102,7 @@ def report_arm(config: CellConfig) -> ArmReport:
     from executive.physics.collision import ClearanceChecker
 
     if model_errors := list(find_arm_model_errors(config.arm)):
-        raise InputError("; ".join(message for _, message in model_errors))
+        raise InputError("\n".join(f"{join_keys(keys)}: {message}" for keys, message in model_errors))
     chain = read_chain(config.arm.urdf, config.arm.flange)
     kinematics = build_planning_kinematics(config)
     reach = measure_reach(config, kinematics)

@@ -5,11 +5,13 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import json
 import os
 from pathlib import Path
 
 import numpy as np
 import pytest
+from at_terminal import invoke
 
 from executive.behaviours import load_skills
 from executive.cell.arm import Goal
@@ -397,3 +399,15 @@ def test_links_can_collide_in_the_same_poses_after_a_whole_turn() -> None:
         with contextlib.closing(CellWorld(config.model_copy(update={"arm": arm}), visuals=False)) as world:
             pairs.append(find_self_collision_pairs(world))
     assert pairs[0] == pairs[1]
+
+
+def test_an_arm_file_accepts_the_pairs_of_links_of_the_report() -> None:
+    write_project(URDF)
+    pairs = json.loads(invoke("arm", "cells/arms/cobot.yaml", "--json").stdout)["self_collision_pairs"]
+    assert ["link_0", "link_2"] in pairs
+    Path("cells/arms/cobot.yaml").write_text(f"{ARM}self_collision_pairs: {pairs}\n")
+    assert json.loads(invoke("arm", "cells/arms/cobot.yaml", "--json").stdout)["self_collision_pairs"] == pairs
+    Path("cells/arms/cobot.yaml").write_text(f"{ARM}self_collision_pairs: [[a, link_2], [link_2, b]]\n")
+    lines = invoke("arm", "cells/arms/cobot.yaml").stderr.splitlines()
+    for line, place in zip(lines, ("pairs[0]: ", "pairs[1]: "), strict=True):
+        assert f"arm.self_collision_{place}the model cobot.urdf of the arm cobot has no link" in line
