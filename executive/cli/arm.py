@@ -54,6 +54,7 @@ def arm_command(
     that can collide with each other, and proposed poses. Exit code 2 if the executive cannot move the arm.
     """
     with shared.keep_stdout_clean():
+        from executive.cell.arm_config import BaseConfig
         from executive.cell.device_config import MAX_LENGTH
         from executive.mission.cell_file import load_cell
         from executive.station.arm_report import draw_reach, place_arm, report_arm
@@ -64,7 +65,7 @@ def arm_command(
             raise InputError(f"--base {' '.join(map(str, base))} is no position of an arm; {limits}")
         arm, text = read_arm(file, flange, target)
         cell_config = load_cell(find_cell(cell))
-        report = report_arm(place_arm(cell_config, arm, base))
+        report = report_arm(place_arm(cell_config, arm, BaseConfig(position=base)))
         if target is not None:
             with explain_os_errors(InputError, f"{target} cannot be written", "name a writable file"):
                 target.write_text(text, encoding="utf-8")
@@ -136,7 +137,7 @@ def _make_value(report: ArmReport) -> dict[str, Any]:
         "left_out": list(report.chain.left_out),
         "solver": report.solver,
         "reach": report.reach.fractions,
-        "best_base": report.reach.best_base.round(3).tolist(),
+        "best_base": report.reach.best_base.model_dump(mode="json"),
         "reach_from_best_base": report.reach.best_fractions,
         "self_collision_pairs": [list(pair) for pair in report.pairs],
         "poses_deg": report.poses_deg,

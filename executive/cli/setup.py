@@ -24,7 +24,7 @@ from executive.errors import ExitCode, InputError, explain_os_errors
 
 if TYPE_CHECKING:
     from executive.cell.arm_config import ArmFile
-    from executive.station.arm_report import ArmReport
+    from executive.cell.config import CellConfig
 
 TEMPLATE = Path(__file__).parent / "template"
 """Folder with the template of every file of a project."""
@@ -204,24 +204,18 @@ def _write_project_with_arm(folder: Path, package: str, urdf: str, flange: str) 
 
     from executive.arms.urdf import find_model
     from executive.cli.arm import dump_yaml, read_arm
-    from executive.motion.reach import find_fitting_speed
     from executive.physics.model_files import list_model_files
     from executive.plugins import PACKAGE_PREFIX
 
     arm, text = read_arm(urdf, flange)
-    layout, report = _choose_layout(arm)
-    # The cell also looks from `aside`.
-    poses_deg = {"aside": report.poses_deg["home"], **report.poses_deg}
-    arm_config = report.config.arm.model_copy(update={"poses_deg": poses_deg})
+    layout, config = _choose_layout(arm)
     sections: dict[str, Any] = {
         "arm": {
             "file": f"arms/{arm.arm}.yaml",
-            "base": {"position": [*arm_config.base.position]},
-            "poses_deg": poses_deg,
+            "base": config.arm.base.model_dump(mode="json"),
+            "poses_deg": {name: [*pose] for name, pose in config.arm.poses_deg.items()},
         },
-        "motion": {
-            "descent_speed": find_fitting_speed(report.config.model_copy(update={"arm": arm_config}))
-        },
+        "motion": {"descent_speed": config.motion.descent_speed},
     }
     files = write_project(folder, package, layout, {"name": arm.arm, "sections": dump_yaml(sections)})
     arms = folder / "cells" / "arms"
@@ -244,18 +238,23 @@ def _write_project_with_arm(folder: Path, package: str, urdf: str, flange: str) 
     return [*files, f"cells/arms/{arm.arm}.yaml"]
 
 
-def _choose_layout(arm: ArmFile) -> tuple[Mapping[str, Any], ArmReport]:
-    """Return the first layout of which an arm reaches everything, and the report about the arm there.
+def _choose_layout(arm: ArmFile) -> tuple[Mapping[str, Any], CellConfig]:
+    """Return the first layout in which an arm can work, and the cell with the arm there.
 
     Raises:
-        InputError: The arm reaches no layout, or has another problem there.
+        InputError: The arm does not reach a place of each layout, or the check of the cell finds an error.
     """
+    from executive.cell.arm_config import BaseConfig
     from executive.cell.config import BinConfig, TableConfig
     from executive.mission.cell_file import load_cell
+    from executive.motion.joints import build_planning_kinematics
+    from executive.motion.reach import find_fitting_speed, measure_reach
     from executive.station.arm_report import place_arm, report_arm
+    from executive.station.check import load_checker
     from executive.text.files import find_cell
 
-    cell = load_cell(find_cell("overhead"))
+    path = find_cell("overhead")
+    cell = load_cell(path)
     for layout in LAYOUTS:
         y = layout["bin_y"]
         bins = {
@@ -263,15 +262,24 @@ def _choose_layout(arm: ArmFile) -> tuple[Mapping[str, Any], ArmReport]:
             for name, sign in {"block_bin": -1, "duck_bin": 1}.items()
         }
         config = cell.model_copy(update={"table": TableConfig(**layout["table"]), "bins": bins})
-        first_report = report_arm(place_arm(config, arm))
-        base = (*first_report.reach.best_base.round(3).tolist(), 0.0)
-        report = report_arm(place_arm(config, arm, base))
-        if min(report.reach.fractions.values()) == 1 and not report.problems:
-            return layout, report
-    missing = [f"{1 - value:.0%} of {name}" for name, value in report.reach.fractions.items() if value < 1]
-    problem = f"it does not reach {', '.join(missing)}" if missing else report.problems[0]
+        config = place_arm(config, arm, BaseConfig())
+        reach = measure_reach(config, build_planning_kinematics(config))
+        report = report_arm(place_arm(config, arm, reach.best_base))
+        missing = [f"{1 - value:.0%} of {name}" for name, value in reach.best_fractions.items() if value < 1]
+        problems = [f"it does not reach {', '.join(missing)}"] if missing else [*report.problems]
+        if problems:
+            continue
+        # The cell also looks from `aside`.
+        poses_deg = {"aside": report.poses_deg["home"], **report.poses_deg}
+        arm_config = report.config.arm.model_copy(update={"poses_deg": poses_deg})
+        config = report.config.model_copy(update={"arm": arm_config})
+        motion = config.motion.model_copy(update={"descent_speed": find_fitting_speed(config)})
+        config = config.model_copy(update={"motion": motion})
+        problems = [message for _, message in load_checker(config.kind).check(config, path.parent)]
+        if not problems:
+            return layout, config
     advice = "start with `executive init` without --urdf, and change table, bins and arm in its cell"
-    raise InputError(f"the arm {arm.arm} cannot work in the cell of a new project: {problem}; {advice}")
+    raise InputError(f"the arm {arm.arm} cannot work in the cell of a new project: {problems[0]}; {advice}")
 
 
 def make_package_name(folder: Path) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -11,15 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.cell.arm import Goal
+from executive.cell.arm_config import BaseConfig
 from executive.cell.config import CellConfig
 from executive.errors import Unreachable
 from executive.geometry import Array, make_tool_down_pose, rotate_about_z
 from executive.motion.configurations import (
     COARSE_ANGLE_STEP,
+    MIN_COSINE_ON_LINE,
     compute_stopping_distance,
     find_configuration_pairs,
 )
-from executive.motion.joints import JointLimits, Kinematics, build_planning_kinematics
+from executive.motion.joints import JointLimits, Kinematics, build_planning_kinematics, wrap_angles
 from executive.text.validate import KeyPath
 
 WORKSPACE = "the workspace"
@@ -30,6 +32,8 @@ RADIUS_STEP = 0.02
 """Distance between the distances from the base at which the reach is computed [m]."""
 MAX_RADIUS = 1.6
 """Largest of these distances [m]; no arm for a table reaches farther."""
+ANGLES = np.radians(np.arange(0, 360, 5))
+"""Directions from the axis of the first joint in which the reach is computed [rad]."""
 BASE_SHIFTS = np.arange(-0.4, 0.401, 0.02)
 """Shifts of the base along x and y among which a better place is searched [m]."""
 BASE_RADIUS = 0.12
@@ -101,20 +105,25 @@ def find_places_out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]
                 message = f'joint {joint} of the pose "{name}" is at {angle:g} degrees; its limit is {limit}'
                 yield ("arm", "poses_deg", name), message
     kinematics = build_planning_kinematics(config)
-    q_start = np.zeros(config.arm.joint_count)
     advice = ""
     for place in list_places(config):
-        errors = []
-        for x, y in place.points.tolist():
-            try:
-                find_configuration_pairs(kinematics, Goal((x, y, place.height)), place.length, q_start)
-            except Unreachable as error:
-                errors.append(error)
-        if errors:
+        if errors := _find_unreachable_points(kinematics, place):
             advice = advice or f"; {measure_reach(config, kinematics).advise()}"
             share = len(errors) / len(place.points)
             part = f" ({share:.0%} of it)" if share < 1 else ""
             yield place.key_path, f"{place.name} is out of reach{part}: {errors[0]}{advice}"
+
+
+def _find_unreachable_points(kinematics: Kinematics, place: Place) -> list[Unreachable]:
+    """Return an error for each point of a place at which the tool cannot descend."""
+    q_start = np.zeros(len(kinematics.joint_range.lower))
+    errors = []
+    for x, y in place.points.tolist():
+        try:
+            find_configuration_pairs(kinematics, Goal((x, y, place.height)), place.length, q_start)
+        except Unreachable as error:
+            errors.append(error)
+    return errors
 
 
 class Reach(NamedTuple):
@@ -122,71 +131,134 @@ class Reach(NamedTuple):
 
     Attributes:
         fractions: Reachable fraction of each place of the cell, by name.
-        best_base: Nearest place of the base with the largest fractions: x, y `(2,)` [m].
+        best_base: Nearest place of the base with the largest fractions.
         best_fractions: Reachable fractions with the base there.
-        radii: Distances `(N,)` [m] from the base at which the tool reaches down to the workspace.
+        is_reached: Returns the mask `(...)` of the horizontal positions `(..., 2)` [m] at which the tool
+            reaches down to the workspace; false everywhere if the axis of the first joint is not vertical.
     """
 
     fractions: dict[str, float]
-    best_base: Array
+    best_base: BaseConfig
     best_fractions: dict[str, float]
-    radii: Array
+    is_reached: Callable[[Array], NDArray[np.bool_]]
 
     def advise(self) -> str:
         """Return a clause for messages: what the arm reaches from the best place of its base."""
-        if sum(self.best_fractions.values()) <= sum(self.fractions.values()):
+        if self.best_fractions == self.fractions:
             return "no other place of the base is better"
-        x, y = self.best_base.round(3).tolist()
+        x, y, _ = self.best_base.position
+        yaw = f" and yaw_deg {self.best_base.yaw_deg:g}" if self.best_base.yaw_deg else ""
         parts = [f"{value:.0%} of {name}" for name, value in self.best_fractions.items() if value < 1]
         reached = f"only {' and '.join(parts)}, and all of the rest" if parts else "everything"
-        return f"with arm.base.position [{x:g}, {y:g}, ...], it reaches {reached}"
+        return f"with arm.base.position [{x:g}, {y:g}, ...]{yaw}, it reaches {reached}"
 
 
 def measure_reach(config: CellConfig, kinematics: Kinematics) -> Reach:
-    """Return the reach of an arm; the turn of its first joint is assumed to be free."""
+    """Return the reach of an arm.
+
+    A better place of its base is one from which the first joint can turn to the places of the cell, with the
+    yaw of the base, else with a yaw that turns the middle of the range of the joint to the workspace.
+    """
     places = list_places(config)
-    radii = RADIUS_STEP * np.arange(1, round(MAX_RADIUS / RADIUS_STEP), dtype=float)
+    axis, direction = _find_first_axis(kinematics)
     descents = {(place.height, place.length) for place in places}
-    masks = {each: _find_reachable_radii(config, kinematics, radii, *each) for each in descents}
+    masks = {each: _find_reachable_turns(config, kinematics, axis, direction, *each) for each in descents}
 
-    def compute_fractions(base: Array) -> dict[str, float]:
-        fractions = {}
-        for place in places:
-            distances = np.linalg.norm(place.points - base, axis=1)
-            indices = np.round(distances / RADIUS_STEP).astype(int) - 1
-            mask = np.append(masks[place.height, place.length], False)  # for all larger distances
-            fractions[place.name] = float(mask[indices.clip(0, len(radii))].mean())
-        return fractions
+    def find_reached(place: Place, points: Array) -> NDArray[np.bool_]:
+        """Return the mask `(...)` of reachable points `(..., 2)` [m], seen from the axis of the joint."""
+        mask = masks[place.height, place.length]
+        rows = np.round(np.linalg.norm(points, axis=-1) / RADIUS_STEP).astype(int)
+        columns = np.round(np.arctan2(points[..., 1], points[..., 0]) / ANGLES[1]).astype(int)
+        return np.asarray(mask[rows.clip(1, len(mask)) - 1, columns % len(ANGLES)])
 
-    base = np.array(config.arm.base.position[:2])
+    def rate(move: tuple[float, Array]) -> float:
+        turn, shift = move
+        rotation = rotate_about_z(turn)[:2, :2]
+        reached = [find_reached(place, (place.points - axis - shift) @ rotation) for place in places]
+        return round(sum(float(mask.mean()) for mask in reached), 6)
+
     shifts = [np.array([dx, dy]) for dx in BASE_SHIFTS for dy in BASE_SHIFTS]
     shifts.sort(key=lambda shift: float(np.linalg.norm(shift)))
-    bases = [base + shift for shift in shifts if _is_free(config, base + shift)]
-    best = max(bases or [base], key=lambda each: round(sum(compute_fractions(each).values()), 6))
-    workspace_mask = masks[places[0].height, places[0].length]
-    return Reach(compute_fractions(base), best, compute_fractions(best), radii[workspace_mask])
-
-
-def _find_reachable_radii(
-    config: CellConfig, kinematics: Kinematics, radii: Array, height: float, length: float
-) -> NDArray[np.bool_]:
-    """Return the mask `(N,)` of the distances `(N,)` [m] from the base at which the tool can descend."""
+    moves = [(0.0, shift) for shift in shifts if _is_free(config, axis + shift)] or [(0.0, np.zeros(2))]
+    turn, shift = max(moves, key=rate)
+    if rate((turn, shift)) < len(places):
+        middle = np.angle((masks[places[0].height, places[0].length] @ np.exp(1j * ANGLES)).sum())
+        x, y = (places[0].points.mean(axis=0) - axis - np.array([each for _, each in moves])).T
+        turns = ANGLES[1] * np.round(wrap_angles(np.arctan2(y, x) - middle) / ANGLES[1])
+        moves += [(float(each), shift) for each, (_, shift) in zip(turns, moves, strict=True)]
+        turn, shift = max(moves, key=rate)
     base = config.arm.base
-    direction = rotate_about_z(math.radians(base.yaw_deg))[:2, 0]
-    q_start = np.zeros(config.arm.joint_count)
-    mask = np.zeros(len(radii), dtype=bool)
-    for index, radius in enumerate(radii.tolist()):
-        x, y = np.array(base.position[:2]) + radius * direction
-        poses = [make_tool_down_pose((x, y, z)) for z in (height + length, height)]
+    x, y = (axis + shift + rotate_about_z(turn)[:2, :2] @ (base.position[:2] - axis)).round(3).tolist()
+    yaw = round((base.yaw_deg + math.degrees(turn)) % 360, 3)
+    best = BaseConfig(position=(x, y, base.position[2]), yaw_deg=yaw - 360 if yaw > 180 else yaw)
+    arm = config.arm.model_copy(update={"base": best})
+    fractions = _compute_fractions(places, kinematics)
+    best_kinematics = build_planning_kinematics(config.model_copy(update={"arm": arm}))
+    best_fractions = _compute_fractions(places, best_kinematics)
+    if sum(best_fractions.values()) <= sum(fractions.values()):
+        best = base
+        best_fractions = fractions
+    return Reach(fractions, best, best_fractions, lambda points: find_reached(places[0], points - axis))
+
+
+def _compute_fractions(places: Sequence[Place], kinematics: Kinematics) -> dict[str, float]:
+    """Return the reachable fraction of each place, by name."""
+    return {
+        place.name: 1 - len(_find_unreachable_points(kinematics, place)) / len(place.points)
+        for place in places
+    }
+
+
+def _find_first_axis(kinematics: Kinematics) -> tuple[Array, float]:
+    """Return the place of the axis of the first joint, and its direction.
+
+    Returns:
+        The horizontal position `(2,)` [m]; 1.0 for an axis upwards, -1.0 downwards, 0.0 if not vertical.
+    """
+    qs = np.zeros((3, len(kinematics.joint_range.lower)))
+    qs[:, 0] = math.tau / 3 * np.arange(3)
+    poses = [kinematics.compute_tool_pose(q) for q in qs]
+    turn = poses[1].rotation @ poses[0].rotation.T
+    direction = float(np.sign(turn[1, 0])) if turn[2, 2] > MIN_COSINE_ON_LINE else 0.0
+    return np.mean([pose.position[:2] for pose in poses], axis=0), direction
+
+
+def _find_reachable_turns(
+    config: CellConfig, kinematics: Kinematics, axis: Array, direction: float, height: float, length: float
+) -> NDArray[np.bool_]:
+    """Return the mask `(N, A)` of distances and `ANGLES` from the first axis at which the tool can descend.
+
+    The distances are multiples of `RADIUS_STEP` from 1; the last row is for all larger distances.
+    """
+    mask = np.zeros((round(MAX_RADIUS / RADIUS_STEP), len(ANGLES)), dtype=bool)
+    if direction == 0:
+        return mask
+    # The solutions in one direction are turned to all others, so that the first joint must be free there.
+    lower, upper = np.array(config.arm.limits.position_ranges_deg).T
+    lower[0] = -360.0
+    upper[0] = 360.0
+    ranges = {"min_position_deg": tuple(lower.tolist()), "position_deg": tuple(upper.tolist())}
+    arm = config.arm.model_copy(update={"limits": config.arm.limits.model_copy(update=ranges)})
+    free_kinematics = build_planning_kinematics(config.model_copy(update={"arm": arm}))
+    smallest, *_ = kinematics.joint_range.lower.tolist()
+    largest, *_ = kinematics.joint_range.upper.tolist()
+    for row in range(len(mask) - 1):
+        x = axis[0] + RADIUS_STEP * (row + 1)
+        poses = [make_tool_down_pose((x, axis[1], z)) for z in (height + length, height)]
         try:
-            (upper_qs, lower_qs), _ = kinematics.solve_all(poses, q_start, COARSE_ANGLE_STEP)
+            (upper_qs, lower_qs), _ = free_kinematics.solve_all(
+                poses, np.zeros(len(lower)), COARSE_ANGLE_STEP
+            )
         except Unreachable:
             continue
-        # The last joint is free, and the first joint turns to the place.
-        free_joints = [0, len(q_start) - 1]
-        upper_qs[:, free_joints] = lower_qs[:, free_joints] = kinematics.joint_range.lower[free_joints]
-        is_inside = kinematics.joint_range.contains(upper_qs) & kinematics.joint_range.contains(lower_qs)
-        mask[index] = is_inside.any()
+        upper_qs[:, -1] = lower_qs[:, -1] = kinematics.joint_range.lower[-1]  # The last joint is free.
+        joint_range = free_kinematics.joint_range
+        is_inside = joint_range.contains(upper_qs) & joint_range.contains(lower_qs)
+        first = lower_qs[is_inside, :1]
+        change = wrap_angles(upper_qs[is_inside, :1] - first)
+        turned = smallest + (first + direction * ANGLES - smallest) % math.tau
+        ends = np.array([turned, turned + change])
+        mask[row] = ((smallest <= ends) & (ends <= largest)).all(axis=0).any(axis=0)
     return mask
 
 

@@ -166,7 +166,7 @@ class _FailedRun:
         return replace(history.look, attempts=items.changes[self.item].attempts)
 
     def find_picture_file(self, run_folder: Path) -> str:
-        """Return the path in `run_folder` of the picture of the failure, else of the last selection, else ""."""
+        """Return the path in `run_folder` of the picture of the failure or of the last selection, or ""."""
         failed = self.timeline.failures.get(self.item) if self.lost_items else self.deciding_activation
         folder = RunDirectory(run_folder).pictures
         file = find_picture(folder, self.item, failed.reason if failed is not None else "")

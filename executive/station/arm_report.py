@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from executive.arms.urdf import JointChain, propose_flange, read_chain
 from executive.cell.arm import Goal
-from executive.cell.arm_config import ArmConfig, ArmFile
+from executive.cell.arm_config import ArmConfig, ArmFile, BaseConfig
 from executive.cell.config import CellConfig
 from executive.errors import InputError, Unreachable
 from executive.geometry import Array
 from executive.motion.configurations import find_configuration_pairs
 from executive.motion.joints import Kinematics, build_planning_kinematics
-from executive.motion.reach import RADIUS_STEP, WORKSPACE, Reach, format_bin, measure_reach
+from executive.motion.reach import WORKSPACE, Reach, format_bin, measure_reach
 from executive.station.camera import CellCamera, Robot
 from executive.station.check import StillRobot, find_payload_errors
 from executive.text.validate import join_keys
@@ -85,10 +85,10 @@ def propose_arm(urdf: str, name: str, flange_link: str = "") -> dict[str, Any]:
     return {"arm": name, "urdf": urdf, "flange": flange_entry, "limits": dict(PROPOSED_LIMITS)}
 
 
-def place_arm(cell: CellConfig, arm: ArmFile, base: Sequence[float] = (0.0, 0.0, 0.0)) -> CellConfig:
+def place_arm(cell: CellConfig, arm: ArmFile, base: BaseConfig) -> CellConfig:
     """Return a cell with another arm, whose only pose is the middle of its joint ranges."""
     middle = tuple((lower + upper) / 2 for lower, upper in arm.limits.position_ranges_deg)
-    content = {**arm.model_dump(), "base": {"position": tuple(base)}, "poses_deg": {"home": middle}}
+    content = {**arm.model_dump(), "base": base, "poses_deg": {"home": middle}}
     return cell.model_copy(update={"arm": ArmConfig.model_validate(content)})
 
 
@@ -199,9 +199,7 @@ def draw_reach(report: ArmReport) -> NDArray[np.uint8]:
 
     rows, columns = np.mgrid[:height, :width]
     points = np.stack([height - rows, width - columns], axis=-1) / PIXELS_PER_METRE + low
-    distances = np.linalg.norm(points - config.arm.base.position[:2], axis=-1)
-    is_reached = np.isin(np.round(distances / RADIUS_STEP), np.round(report.reach.radii / RADIUS_STEP))
-    image[is_reached] = (214, 236, 214)
+    image[report.reach.is_reached(points)] = (214, 236, 214)
 
     def write(text: str, point: Sequence[float] | Array) -> None:
         column, row = to_pixel(point)
@@ -216,10 +214,11 @@ def draw_reach(report: ArmReport) -> NDArray[np.uint8]:
         colour = [int(255 * value) for value in bin.colour]
         cv2.rectangle(image, to_pixel(centre - half), to_pixel(centre + half), colour, 2)
         write(f"{name} {report.reach.fractions[format_bin(name)]:.0%}", (centre[0], centre[1] + half[1]))
-    base = np.array(config.arm.base.position[:2])
-    if np.abs(report.reach.best_base - base).max() > 0:
-        cv2.circle(image, to_pixel(report.reach.best_base), 8, DARK, 2)
-        write("best base", report.reach.best_base)
+    base = config.arm.base.position
+    best_base = report.reach.best_base.position
+    if best_base != base:
+        cv2.circle(image, to_pixel(best_base), 8, DARK, 2)
+        write("best base", best_base)
     cv2.circle(image, to_pixel(base), 8, DARK, -1)
     write(f"base of {config.arm.arm} (green: in reach)", base)
     return image

@@ -103,17 +103,43 @@ def test_the_guide_leads_from_a_urdf_to_sorted_objects(model: Path) -> None:
     assert value["audit"]["agrees"] and value["items"]["placed"] >= 3
 
 
-def check_project(*words: str) -> list[str]:
-    """Create a project with an arm, and return the errors that the check finds in its cell."""
+def check_project(*words: str) -> CellConfig:
+    """Create a project with an arm, and return its cell, in which the check finds no error."""
     result = invoke("init", "hall", *words)
     assert result.exit_code == 0, result.output
     path = Path("hall/cells/table.yaml")
-    return [message for _, message in load_checker("sim").check(load_cell(path), path.parent)]
+    config = load_cell(path)
+    assert list(load_checker("sim").check(config, path.parent)) == []
+    return config
 
 
 @pytest.mark.slow
 def test_the_cell_of_a_new_project_passes_its_check(model: Path) -> None:
-    assert check_project("--urdf", "kuka_iiwa/model.urdf", "--flange", "lbr_iiwa_link_7") == []
+    check_project("--urdf", "kuka_iiwa/model.urdf", "--flange", "lbr_iiwa_link_7")
+
+
+def test_a_new_project_turns_the_range_of_the_first_joint_to_the_workspace(model: Path) -> None:
+    text = model.read_text()
+    limit = 'lower="-6.28318530718" upper="6.28318530718"'
+    model.write_text(text.replace(limit, 'lower="1" upper="4"', 1))
+    assert check_project("--urdf", str(model)).arm.base.yaw_deg != 0
+    shutil.rmtree("hall")
+    narrow = model.with_name("narrow.urdf")
+    narrow.write_text(text.replace(limit, 'lower="0" upper="0.6"', 1))
+    result = invoke("init", "hall", "--urdf", str(narrow))
+    assert (result.exit_code, Path("hall").exists()) == (2, False)
+    assert "cannot work in the cell of a new project: it does not reach" in result.stderr
+
+
+def test_the_reach_is_measured_from_the_axis_of_the_first_joint(model: Path) -> None:
+    text = model.read_text()
+    before, joint, after = text.partition('name="world_joint"')
+    model.write_text(before + joint + after.replace('xyz="0 0 0"', 'xyz="-0.5 0.4 0"', 1))
+    value = json.loads(invoke("arm", str(model), "--base", "0.56", "-0.34", "0", "--json").stdout)
+    assert set(value["reach"].values()) == {1}
+    value = json.loads(invoke("arm", str(model), "--base", "0.5", "-0.4", "0", "--json").stdout)
+    assert value["reach"]['the bin "yellow_bin"'] == pytest.approx(2 / 3)
+    assert value["best_base"]["position"] == [0.56, -0.34, 0]
 
 
 def test_places_out_of_reach_have_an_advice_that_helps(xarm6: CellConfig) -> None:
@@ -121,9 +147,10 @@ def test_places_out_of_reach_have_an_advice_that_helps(xarm6: CellConfig) -> Non
     ((keys, message),) = find_places_out_of_reach(far)
     assert keys == ("bins", "yellow_bin", "position")
     assert 'the bin "yellow_bin" is out of reach (33% of it): the tool cannot reach' in message
-    x, y = measure_reach(far, build_planning_kinematics(far)).best_base.tolist()
+    best_base = measure_reach(far, build_planning_kinematics(far)).best_base
+    x, y, _ = best_base.position
     assert f"with arm.base.position [{x:g}, {y:g}, ...], it reaches everything" in message
-    moved = with_arm(xarm6, base=BaseConfig(position=(x, y, 0.0)))
+    moved = with_arm(xarm6, base=best_base)
     assert not list(find_places_out_of_reach(moved))
 
 

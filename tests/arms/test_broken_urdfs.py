@@ -406,7 +406,9 @@ def test_an_arm_file_accepts_the_pairs_of_links_of_the_report() -> None:
     pairs = json.loads(invoke("arm", "cells/arms/cobot.yaml", "--json").stdout)["self_collision_pairs"]
     assert ["link_0", "link_2"] in pairs
     Path("cells/arms/cobot.yaml").write_text(f"{ARM}self_collision_pairs: {pairs}\n")
-    assert json.loads(invoke("arm", "cells/arms/cobot.yaml", "--json").stdout)["self_collision_pairs"] == pairs
+    assert (
+        json.loads(invoke("arm", "cells/arms/cobot.yaml", "--json").stdout)["self_collision_pairs"] == pairs
+    )
     Path("cells/arms/cobot.yaml").write_text(f"{ARM}self_collision_pairs: [[a, link_2], [link_2, b]]\n")
     lines = invoke("arm", "cells/arms/cobot.yaml").stderr.splitlines()
     for line, place in zip(lines, ("pairs[0]: ", "pairs[1]: "), strict=True):
