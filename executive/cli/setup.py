@@ -204,7 +204,7 @@ def _write_project_with_arm(folder: Path, package: str, urdf: str, flange: str) 
 
     from executive.arms.urdf import find_model
     from executive.cli.arm import dump_yaml, read_arm
-    from executive.physics.model_files import list_model_files
+    from executive.physics.arm_model import list_arm_files
     from executive.plugins import PACKAGE_PREFIX
 
     arm, text = read_arm(urdf, flange)
@@ -217,13 +217,13 @@ def _write_project_with_arm(folder: Path, package: str, urdf: str, flange: str) 
         },
         "motion": {"descent_speed": config.motion.descent_speed},
     }
+    model_files = list_arm_files(arm)
     files = write_project(folder, package, layout, {"name": arm.arm, "sections": dump_yaml(sections)})
     arms = folder / "cells" / "arms"
     with explain_os_errors(InputError, f"{arms} cannot be written", "name a writable folder"):
         arms.mkdir(parents=True)
         if not urdf.startswith(PACKAGE_PREFIX):
             model = find_model(arm.urdf)
-            model_files = list_model_files(model)
             root = Path(os.path.commonpath([file.parent for file in model_files]))
             for file in model_files:
                 copy = arms / root.name / file.relative_to(root)

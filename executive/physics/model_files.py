@@ -193,6 +193,11 @@ def find_mesh(urdf: Path, mesh: Element) -> Path:
     return find_model(file)
 
 
+def find_references(part: Element) -> list[Element]:
+    """Return the elements in a part of a URDF that name a file which PyBullet opens."""
+    return [element for element in part.iter() if element.tag in ("mesh", "texture")]
+
+
 def list_model_files(model: Path) -> list[Path]:
     """Return a URDF or mesh, and the existing files that it names: meshes, materials and textures.
 
@@ -214,13 +219,13 @@ def list_named_files(path: Path) -> list[Path]:
         InputError: The file names too many files, or one that is too large, no regular file, or outside of
             its folder.
     """
-    values: list[str] = []
+    names: dict[str, None] = {}
     if path.suffix.lower() in (".obj", ".mtl"):
         values = _NAMED_FILE.findall(path.read_text(encoding="utf-8", errors="surrogateescape"))
+        # Options of a material may precede the name, and PyBullet reads only one word of some names.
+        names = dict.fromkeys(name for value in values for name in (value.strip(), *value.split()))
     elif path.suffix.lower() == ".urdf":
-        values = [element.attrib["filename"] for element in read_robot(path).findall(".//*[@filename]")]
-    # Options of a material may precede the name, and PyBullet reads only one word of some names.
-    names = dict.fromkeys(name for value in values for name in (value.strip(), *value.split()))
+        names = dict.fromkeys(element.get("filename", "") for element in find_references(read_robot(path)))
     if len(names) > MAX_GROUP_COUNT:
         raise InputError(f"the model {path.name} names more than {MAX_GROUP_COUNT} files; join them")
     # A missing file of another computer, such as D:\colours.png, is no file outside of the folder.

@@ -20,8 +20,10 @@ from executive.mission.cell_file import load_cell
 from executive.mission.load import load_mission
 from executive.motion.configurations import find_configuration_pairs
 from executive.motion.joints import build_kinematics
+from executive.physics.arm_model import list_arm_files
 from executive.physics.cell_world import CellWorld
 from executive.physics.collision import find_self_collision_pairs
+from executive.physics.model_files import list_model_files
 from executive.station.check import load_checker
 from executive.text.findings import MissionError
 
@@ -413,3 +415,14 @@ def test_an_arm_file_accepts_the_pairs_of_links_of_the_report() -> None:
     lines = invoke("arm", "cells/arms/cobot.yaml").stderr.splitlines()
     for line, place in zip(lines, ("pairs[0]: ", "pairs[1]: "), strict=True):
         assert f"arm.self_collision_{place}the model cobot.urdf of the arm cobot has no link" in line
+
+
+def test_only_files_that_pybullet_opens_belong_to_an_arm() -> None:
+    plugin = '<gazebo><plugin filename="/opt/no.so"/></gazebo>'
+    write_project(change_mesh("link 4.stl").replace("</robot>", f"{plugin}</robot>"))
+    Path("cells/arms/link 4.stl").write_bytes(make_stl())
+    urdf = Path("cells/arms/cobot.urdf").resolve()
+    assert list_model_files(urdf) == [urdf, urdf.with_name("link 4.stl")]
+    gripper = GRIPPER.replace("no.stl", "http://x.org/no.stl")
+    urdf.write_text(urdf.read_text().replace("</robot>", f"{gripper}</robot>"))
+    assert list_arm_files(load_cell(Path("cells/bench.yaml")).arm) == [urdf, urdf.with_name("link 4.stl")]
