@@ -60,6 +60,8 @@ def arm_command(
         from executive.station.arm_report import draw_reach, place_arm, report_arm
         from executive.text.files import find_cell
 
+        if picture is not None and picture.suffix.lower() != ".png":
+            raise InputError(f"{picture} is no name of a PNG file; name a file that ends with .png")
         if not all(abs(coordinate) <= MAX_LENGTH for coordinate in base):  # NaN is in no range.
             limits = f"write three numbers from {-MAX_LENGTH:g} to {MAX_LENGTH:g} m"
             raise InputError(f"--base {' '.join(map(str, base))} is no position of an arm; {limits}")
@@ -75,7 +77,7 @@ def arm_command(
             with explain_os_errors(InputError, f"{picture} cannot be written", "name a writable file"):
                 Image.fromarray(draw_reach(report)).save(picture, format="PNG")
     shared.print_result(_make_value(report), "\n".join(_list_lines(report)), as_json=as_json)
-    return ExitCode.SUCCESS
+    return ExitCode.INVALID_INPUT if report.problems else ExitCode.SUCCESS
 
 
 def read_arm(file: str, flange: str = "", target: Path | None = None) -> tuple[ArmFile, str]:
@@ -94,6 +96,9 @@ def read_arm(file: str, flange: str = "", target: Path | None = None) -> tuple[A
     shipped = get_shipped_folder() / "arms" / f"{file}.yaml"
     path = shipped if shipped.is_file() and not os.path.exists(file) else Path(file)
     if path.suffix in (".yaml", ".yml"):
+        if flange or target:
+            advice = "copy the file, or change flange.link in it"
+            raise InputError(f"{file} is an arm file, but --flange and --write are for a URDF; {advice}")
         source = read_source(path)
         return load_arm(source, path.parent), source.text
     is_file = path.is_file() and not file.startswith(PACKAGE_PREFIX)
@@ -102,6 +107,8 @@ def read_arm(file: str, flange: str = "", target: Path | None = None) -> tuple[A
     content = propose_arm(urdf, name, flange)
 
     arm = load_arm(Source(file, dump_yaml({**content, "urdf": path.name if is_file else file})), path.parent)
+    if target is not None and target.exists():
+        raise InputError(f"{target} exists; name a new file, or delete it first")
     if target is None or not is_file:
         return arm, dump_yaml({**content, "urdf": file})
     relative_path = os.path.relpath(urdf, target.resolve().parent)

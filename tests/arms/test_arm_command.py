@@ -81,10 +81,21 @@ def test_what_is_no_arm_is_refused_with_the_link_or_joint(model: Path) -> None:
         ((str(model), "--base", "nan", "0", "0"), "--base nan 0.0 0.0 is no position of an arm; write three"),
         ((str(model), "--base", "0", "-1e9", "0"), "write three numbers from -10 to 10 m"),
         ((str(model), "--write", "elsewhere/arm.yaml"), "outside of its folder"),
+        ((str(model), "--write", "old.yaml"), "old.yaml exists; name a new file"),
+        ((str(model), "--picture", "reach.jpg"), "reach.jpg is no name of a PNG file"),
+        (("xarm6", "--write", "arm.yaml"), "xarm6 is an arm file, but --flange and --write are for a URDF"),
+        (("xarm6", "--flange", "link5"), "xarm6 is an arm file, but --flange and --write are for a URDF"),
     ):  # fmt: skip
         Path("elsewhere").mkdir(exist_ok=True)
+        Path("old.yaml").touch()
         result = invoke("arm", *words)
         assert (result.exit_code, message in result.stderr) == (2, True), result.stderr
+
+
+def test_a_report_with_a_problem_ends_with_exit_code_2(model: Path) -> None:
+    model.write_text(model.read_text().replace('effort="50.0"', 'effort="1"'))
+    result = invoke("arm", str(model))
+    assert (result.exit_code, "problem: joint 2 needs" in result.stdout) == (2, True)
 
 
 @pytest.mark.slow
