@@ -395,16 +395,15 @@ def propose_flange(urdf: str, link: str = "") -> FlangeConfig:
     moving_parents = [_get_link(joint, "parent") for joint in joints.values() if joint.get("type") != "fixed"]
 
     def count_joints(end: str) -> int:
-        """Return the number of joints from the base to a link, 0 if this is no chain of an arm."""
+        """Return the number of revolute joints from the base to a link, 0 for a branch of a gripper."""
         count = 0
         for _ in joints:
             if end not in joints:
                 break
-            kind = joints[end].get("type", "")
             parent = _get_link(joints[end], "parent")
-            if kind not in (*MOVABLE_KINDS, "fixed") or moving_parents.count(parent) > 1:
+            if moving_parents.count(parent) > 1:
                 return 0
-            count += kind != "fixed"
+            count += joints[end].get("type") in MOVABLE_KINDS
             end = parent
         return count
 

@@ -229,8 +229,7 @@ def _write_project_with_arm(folder: Path, package: str, urdf: str, flange: str) 
                 copy = arms / root.name / file.relative_to(root)
                 copy.parent.mkdir(parents=True, exist_ok=True)
                 shutil.copyfile(file, copy)
-            count_text = f"{len(model_files)} file{'s' if model_files[1:] else ''}"
-            files.append(f"cells/arms/{root.name} ({count_text})")
+            files.append(f"cells/arms/{root.name} ({len(model_files)} file(s))")
             content = yaml.safe_load(text)
             text = dump_yaml(
                 {**content, "urdf": str(PurePosixPath(root.name, *model.relative_to(root).parts))}

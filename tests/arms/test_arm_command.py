@@ -74,7 +74,11 @@ def test_it_describes_a_urdf_and_writes_an_arm_file_that_it_reads(model: Path) -
 
 
 def test_what_is_no_arm_is_refused_with_the_link_or_joint(model: Path) -> None:
+    text = model.read_text()
+    joint_3 = 'name="joint3" type="revolute"'
+    model.with_name("lift.urdf").write_text(text.replace(joint_3, 'name="joint3" type="prismatic"'))
     for words, message in (
+        (("bench/lift.urdf",), 'the joint "joint3" of the model lift.urdf is prismatic; the joints between'),
         (("cube.urdf",), "the model cube.urdf has no chain of revolute joints"),
         ((str(model), "--flange", "link_base"), 'has 0 joint(s) up to the link "link_base"'),
         (("nothing.urdf",), "there is no model nothing.urdf"),
