@@ -166,7 +166,9 @@ def _make_unreachable_error(
     for pose, qs in zip(poses, qs_by_pose, strict=True):
         x, y, z = pose.position
         if not np.any(kinematics.joint_range.contains(qs)):
-            excess = kinematics.joint_range.compute_excess(qs[~np.isnan(qs).any(axis=1)])
+            # A solver returns one of the equivalent positions of each joint.
+            turned_qs = qs[~np.isnan(qs).any(axis=1)] + math.tau * np.array([-1, 0, 1])[:, None, None]
+            excess = kinematics.joint_range.compute_excess(turned_qs).min(axis=0)
             if not len(excess):
                 continue  # No branch leads from the other pose to this pose.
             min_excess = excess[np.argmin(np.max(excess, axis=1))]
