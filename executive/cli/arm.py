@@ -91,7 +91,7 @@ def read_arm(file: str, flange: str = "", target: Path | None = None) -> tuple[A
     from executive.plugins import PACKAGE_PREFIX
     from executive.station.arm_report import propose_arm
     from executive.text.files import get_shipped_folder, read_source
-    from executive.text.findings import Source
+    from executive.text.findings import MissionError, Source
 
     shipped = get_shipped_folder() / "arms" / f"{file}.yaml"
     path = shipped if shipped.is_file() and not os.path.exists(file) else Path(file)
@@ -106,7 +106,11 @@ def read_arm(file: str, flange: str = "", target: Path | None = None) -> tuple[A
     name = "".join(c if c.isalnum() else "_" for c in find_model(urdf).stem.lower())
     content = propose_arm(urdf, name, flange)
 
-    arm = load_arm(Source(file, dump_yaml({**content, "urdf": path.name if is_file else file})), path.parent)
+    try:
+        source = Source(file, dump_yaml({**content, "urdf": path.name if is_file else file}))
+        arm = load_arm(source, path.parent)
+    except MissionError as error:  # The lines of the findings are in no file.
+        raise InputError("\n".join(f"{file}: {each.message}" for each in error.findings)) from None
     if target is not None and target.exists():
         raise InputError(f"{target} exists; name a new file, or delete it first")
     if target is None or not is_file:

@@ -77,7 +77,9 @@ def test_what_is_no_arm_is_refused_with_the_link_or_joint(model: Path) -> None:
     text = model.read_text()
     joint_3 = 'name="joint3" type="revolute"'
     model.with_name("lift.urdf").write_text(text.replace(joint_3, 'name="joint3" type="prismatic"'))
+    model.with_name("still.urdf").write_text(text.replace(' velocity="3.14"', ""))
     for words, message in (
+        (("bench/still.urdf",), "bench/still.urdf: the model still.urdf has no limits.velocity_deg from 1 to"),
         (("bench/lift.urdf",), 'the joint "joint3" of the model lift.urdf is prismatic; the joints between'),
         (("cube.urdf",), "the model cube.urdf has no chain of revolute joints"),
         ((str(model), "--flange", "link_base"), 'has 0 joint(s) up to the link "link_base"'),
@@ -167,6 +169,14 @@ def test_places_out_of_reach_have_an_advice_that_helps(xarm6: CellConfig) -> Non
     assert f"with arm.base.position [{x:g}, {y:g}, ...], it reaches everything" in message
     moved = with_arm(xarm6, base=best_base)
     assert not list(find_places_out_of_reach(moved))
+
+
+def test_a_place_out_of_reach_is_as_far_from_the_joint_range_as_the_nearest_turn(xarm6: CellConfig) -> None:
+    lower, upper = zip(*xarm6.arm.limits.position_ranges_deg, strict=True)
+    ranges = {"min_position_deg": (-28.0, *lower[1:]), "position_deg": (28.0, *upper[1:])}
+    limits = xarm6.arm.limits.model_copy(update=ranges)
+    messages = dict(find_places_out_of_reach(with_arm(xarm6, base=BaseConfig(), limits=limits)))
+    assert "leaves joint 1 5.7° outside ±28°" in messages["safe_place",]
 
 
 def test_a_descent_from_which_the_arm_cannot_stop_in_time_is_an_error(xarm6: CellConfig) -> None:
