@@ -313,6 +313,16 @@ def find_arm_model_errors(arm: ArmFile) -> Iterator[tuple[KeyPath, str]]:
         joints = f"{len(chain.joints)} joints up to the flange: {', '.join(chain.joints)}"
         message = f"the model {path.name} has {joints}; the limits are for {arm.joint_count} joints"
         yield ("arm", "limits"), message
+    # The tool is beyond the link before the last joint.
+    frames = chain.compute_frames(np.zeros(len(chain.joints)))
+    for name, (count, X_JL) in chain.places.items():
+        if count == len(chain.joints) - 1 and name in hulls:
+            centre = (frames[-1].inverse() @ frames[count] @ X_JL).apply(hulls[name].mean(axis=0))
+            if centre[2] > HULL_MARGIN:
+                message = (
+                    f'the z axis of the flange of the model {path.name} points back to the link "{name}"'
+                )
+                yield ("arm", "flange"), f"{message}; turn it by 180 degrees with flange.rotation_deg"
     moving = {name for name, (count, _) in chain.places.items() if count > 1}
     if not moving & hulls.keys():
         message = f"the model {path.name} has no <collision> after its first joint; it would touch nothing"

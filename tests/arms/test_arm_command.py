@@ -79,8 +79,8 @@ def test_what_is_no_arm_is_refused_with_the_link_or_joint(model: Path) -> None:
     model.with_name("lift.urdf").write_text(text.replace(joint_3, 'name="joint3" type="prismatic"'))
     model.with_name("still.urdf").write_text(text.replace(' velocity="3.14"', ""))
     for words, message in (
-        (("bench/still.urdf",), "bench/still.urdf: the model still.urdf has no limits.velocity_deg from 1 to"),
-        (("bench/lift.urdf",), 'the joint "joint3" of the model lift.urdf is prismatic; the joints between'),
+        (("bench/still.urdf",), "bench/still.urdf: the model still.urdf has no limits.velocity_deg"),
+        (("bench/lift.urdf",), 'the joint "joint3" of the model lift.urdf is prismatic; the'),
         (("cube.urdf",), "the model cube.urdf has no chain of revolute joints"),
         ((str(model), "--flange", "link_base"), 'has 0 joint(s) up to the link "link_base"'),
         (("nothing.urdf",), "there is no model nothing.urdf"),

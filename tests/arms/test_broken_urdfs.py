@@ -20,7 +20,7 @@ from executive.mission.cell_file import load_cell
 from executive.mission.load import load_mission
 from executive.motion.configurations import find_configuration_pairs
 from executive.motion.joints import build_kinematics
-from executive.physics.arm_model import list_arm_files
+from executive.physics.arm_model import find_arm_model_errors, list_arm_files
 from executive.physics.cell_world import CellWorld
 from executive.physics.collision import find_self_collision_pairs
 from executive.physics.model_files import list_model_files
@@ -426,3 +426,14 @@ def test_only_files_that_pybullet_opens_belong_to_an_arm() -> None:
     gripper = GRIPPER.replace("no.stl", "http://x.org/no.stl")
     urdf.write_text(urdf.read_text().replace("</robot>", f"{gripper}</robot>"))
     assert list_arm_files(load_cell(Path("cells/bench.yaml")).arm) == [urdf, urdf.with_name("link 4.stl")]
+
+
+def test_a_flange_that_points_back_into_the_arm_is_an_error() -> None:
+    joint = '<joint name="fix" type="fixed"><origin xyz="0 0 0.08"/><parent link="link_6"/><child link="tool0"/></joint>'
+    write_project(add(f'<link name="tool0"/>{joint}'))
+    for rotation, count in ((0, 0), (180, 1)):
+        flange = f"flange: {{link: tool0, rotation_deg: [{rotation}, 0, 0]}}"
+        Path("cells/arms/cobot.yaml").write_text(ARM.replace("flange: {link: link_6, offset: 0.08}", flange))
+        errors = list(find_arm_model_errors(load_cell(Path("cells/bench.yaml")).arm))
+        assert len(errors) == count
+    assert 'flange of the model cobot.urdf points back to the link "link_5"' in errors[0][1]
