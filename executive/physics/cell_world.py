@@ -15,7 +15,7 @@ import numpy as np
 import pybullet
 from pybullet_utils.bullet_client import BulletClient
 
-from executive.arms.urdf import find_model, read_chain
+from executive.arms.urdf import MAX_AXIS_ANGLE, find_model, read_chain
 from executive.cell.arm_config import TOOL_LINK
 from executive.cell.config import BinConfig, CellConfig
 from executive.cell.device_config import STEP
@@ -56,6 +56,7 @@ class CellWorld:
         arm_urdf: URDF of this body.
         joints: Indices of the joints of the arm, which are also the indices of the links that they move.
         joint_counts: Number of joints before each link of the arm, by the index of the link; -1: the base.
+        has_vertical_axis: True if the axis of the first joint is vertical.
         tool_index: Index of the link of the tool, whose frame is the frame of the flange.
         table, floor: Bodies of the table and of the floor under the table.
         bin_bodies: Body of each bin, by name.
@@ -85,6 +86,7 @@ class CellWorld:
         ]
         link_names = [info[LINK_NAME].decode() for info in infos]
         chain = read_chain(config.arm.urdf, config.arm.flange)
+        self.has_vertical_axis = bool(abs(chain.offsets[0].rotation[2, 2]) > math.cos(MAX_AXIS_ANGLE))
         # The first link of the chain is the base.
         self._link_names = [next(iter(chain.places)), *link_names]
         self.tool_index = self.find_link(TOOL_LINK)

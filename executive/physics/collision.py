@@ -174,9 +174,11 @@ class ClearanceChecker:
         counts = world.joint_counts
         joints = range(len(world.joints))
         bodies = [("the table", world.table), *world.bin_bodies.items(), *obstacles]
-        # Joint 1 turns the first link about the axis of the base.
+        # A vertical joint 1 turns the first link about the axis of the base.
+        first_count = 1 + world.has_vertical_axis
+        touching = [link for link, count in counts.items() if count >= first_count]
         links = [link for link, count in counts.items() if count > 1]
-        pairs = [BodyPair((world.arm, body), links, joints, body_name=name) for name, body in bodies]
+        pairs = [BodyPair((world.arm, body), touching, joints, body_name=name) for name, body in bodies]
         for link_a, link_b in self.self_collision_pairs:
             first, last = sorted((counts[link_a], counts[link_b]))
             pair = BodyPair((world.arm, world.arm), [link_a], joints[first:last], world.name_link(link_b))

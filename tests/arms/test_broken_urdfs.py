@@ -22,7 +22,7 @@ from executive.motion.configurations import find_configuration_pairs
 from executive.motion.joints import build_kinematics
 from executive.physics.arm_model import find_arm_model_errors, list_arm_files
 from executive.physics.cell_world import CellWorld
-from executive.physics.collision import find_self_collision_pairs
+from executive.physics.collision import ClearanceChecker, find_self_collision_pairs
 from executive.physics.model_files import list_model_files
 from executive.station.check import load_checker
 from executive.text.findings import MissionError
@@ -437,3 +437,10 @@ def test_a_flange_that_points_back_into_the_arm_is_an_error() -> None:
         errors = list(find_arm_model_errors(load_cell(Path("cells/bench.yaml")).arm))
         assert len(errors) == count
     assert 'flange of the model cobot.urdf points back to the link "link_5"' in errors[0][1]
+
+
+def test_the_first_link_of_an_arm_on_a_wall_can_touch_the_table() -> None:
+    joint = '<joint name="wall" type="fixed"><origin xyz="0 0 0.02" rpy="0 1.5708 0"/><parent link="wall"/><child link="link_0"/></joint>'
+    write_project(add(f'<link name="wall"/>{joint}'))
+    with contextlib.closing(ClearanceChecker(load_cell(Path("cells/bench.yaml")))) as checker:
+        assert str(checker.find_violation(np.zeros(6))).startswith("link 1 ")
