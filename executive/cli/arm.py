@@ -30,11 +30,7 @@ LINE_WIDTH = 100
 @click.option("--flange", default="", help="Link of the URDF at the flange; by default, one is proposed.")
 @click.option("--cell", default=DEFAULT_CELL, help="Cell file or shipped cell with table, bins and tool.")
 @click.option(
-    "--base",
-    type=(float, float, float),
-    default=(0.0, 0.0, 0.0),
-    metavar="X Y Z",
-    help="Position of the base in the cell [m].",
+    "--base", type=(float,) * 3, default=(0.0,) * 3, metavar="X Y Z", help="Position of the base [m]."
 )
 @click.option("--write", "target", type=shared.FILE, help="Arm file to write, beside the URDF or above it.")
 @click.option("--picture", type=shared.FILE, help="File (.png) for a picture of the reach, from above.")

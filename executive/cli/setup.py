@@ -204,7 +204,7 @@ def _write_project_with_arm(folder: Path, package: str, urdf: str, flange: str) 
 
     from executive.arms.urdf import find_model
     from executive.cli.arm import dump_yaml, read_arm
-    from executive.physics.arm_model import list_arm_files
+    from executive.physics.model_files import list_arm_files
     from executive.plugins import PACKAGE_PREFIX
 
     arm, text = read_arm(urdf, flange)
@@ -267,15 +267,14 @@ def _choose_layout(arm: ArmFile) -> tuple[Mapping[str, Any], CellConfig]:
         report = report_arm(place_arm(config, arm, reach.best_base))
         missing = [f"{1 - value:.0%} of {name}" for name, value in reach.best_fractions.items() if value < 1]
         problems = [f"it does not reach {', '.join(missing)}"] if missing else [*report.problems]
-        if problems:
-            continue
-        # The cell also looks from `aside`.
-        poses_deg = {"aside": report.poses_deg["home"], **report.poses_deg}
-        arm_config = report.config.arm.model_copy(update={"poses_deg": poses_deg})
-        config = report.config.model_copy(update={"arm": arm_config})
-        motion = config.motion.model_copy(update={"descent_speed": find_fitting_speed(config)})
-        config = config.model_copy(update={"motion": motion})
-        problems = [message for _, message in load_checker(config.kind).check(config, path.parent)]
+        if not problems:
+            # The cell also looks from `aside`.
+            poses_deg = {"aside": report.poses_deg["home"], **report.poses_deg}
+            arm_config = report.config.arm.model_copy(update={"poses_deg": poses_deg})
+            config = report.config.model_copy(update={"arm": arm_config})
+            motion = config.motion.model_copy(update={"descent_speed": find_fitting_speed(config)})
+            config = config.model_copy(update={"motion": motion})
+            problems = [message for _, message in load_checker(config.kind).check(config, path.parent)]
         if not problems:
             return layout, config
     advice = "start with `executive init` without --urdf, and change table, bins and arm in its cell"

@@ -180,17 +180,15 @@ def measure_reach(config: CellConfig, kinematics: Kinematics) -> Reach:
     shifts = [np.array([dx, dy]) for dx in BASE_SHIFTS for dy in BASE_SHIFTS]
     shifts.sort(key=lambda shift: float(np.linalg.norm(shift)))
     moves = [(0.0, shift) for shift in shifts if _is_free(config, axis + shift)] or [(0.0, np.zeros(2))]
+    middle = np.angle((masks[places[0].height, places[0].length] @ np.exp(1j * ANGLES)).sum())
+    x, y = (places[0].points.mean(axis=0) - axis - np.array([shift for _, shift in moves])).T
+    turns = ANGLES[1] * np.round(wrap_angles(np.arctan2(y, x) - middle) / ANGLES[1])
+    moves += [(float(turn), shift) for turn, (_, shift) in zip(turns, moves, strict=True)]
     turn, shift = max(moves, key=rate)
-    if rate((turn, shift)) < len(places):
-        middle = np.angle((masks[places[0].height, places[0].length] @ np.exp(1j * ANGLES)).sum())
-        x, y = (places[0].points.mean(axis=0) - axis - np.array([each for _, each in moves])).T
-        turns = ANGLES[1] * np.round(wrap_angles(np.arctan2(y, x) - middle) / ANGLES[1])
-        moves += [(float(each), shift) for each, (_, shift) in zip(turns, moves, strict=True)]
-        turn, shift = max(moves, key=rate)
     base = config.arm.base
     x, y = (axis + shift + rotate_about_z(turn)[:2, :2] @ (base.position[:2] - axis)).round(3).tolist()
-    yaw = round((base.yaw_deg + math.degrees(turn)) % 360, 3)
-    best = BaseConfig(position=(x, y, base.position[2]), yaw_deg=yaw - 360 if yaw > 180 else yaw)
+    yaw = math.degrees(wrap_angles(np.array(math.radians(base.yaw_deg) + turn)))
+    best = BaseConfig(position=(x, y, base.position[2]), yaw_deg=round(yaw, 3))
     arm = config.arm.model_copy(update={"base": best})
     fractions = _compute_fractions(places, kinematics)
     best_kinematics = build_planning_kinematics(config.model_copy(update={"arm": arm}))
@@ -210,11 +208,7 @@ def _compute_fractions(places: Sequence[Place], kinematics: Kinematics) -> dict[
 
 
 def _find_first_axis(kinematics: Kinematics) -> tuple[Array, float]:
-    """Return the place of the axis of the first joint, and its direction.
-
-    Returns:
-        The horizontal position `(2,)` [m]; 1.0 for an axis upwards, -1.0 downwards, 0.0 if not vertical.
-    """
+    """Return the position `(2,)` [m] of the first axis, and its direction: 1.0 up, -1.0 down, 0.0 tilted."""
     qs = np.zeros((3, len(kinematics.joint_range.lower)))
     qs[:, 0] = math.tau / 3 * np.arange(3)
     poses = [kinematics.compute_tool_pose(q) for q in qs]
@@ -234,26 +228,22 @@ def _find_reachable_turns(
     if direction == 0:
         return mask
     # The solutions in one direction are turned to all others, so that the first joint must be free there.
-    lower, upper = np.array(config.arm.limits.position_ranges_deg).T
-    lower[0] = -360.0
-    upper[0] = 360.0
-    ranges = {"min_position_deg": tuple(lower.tolist()), "position_deg": tuple(upper.tolist())}
+    lower, upper = zip(*config.arm.limits.position_ranges_deg, strict=True)
+    ranges = {"min_position_deg": (-360.0, *lower[1:]), "position_deg": (360.0, *upper[1:])}
     arm = config.arm.model_copy(update={"limits": config.arm.limits.model_copy(update=ranges)})
     free_kinematics = build_planning_kinematics(config.model_copy(update={"arm": arm}))
-    smallest, *_ = kinematics.joint_range.lower.tolist()
-    largest, *_ = kinematics.joint_range.upper.tolist()
+    smallest = kinematics.joint_range.lower[0]
+    largest = kinematics.joint_range.upper[0]
+    q_start = np.zeros(len(lower))
     for row in range(len(mask) - 1):
         x = axis[0] + RADIUS_STEP * (row + 1)
         poses = [make_tool_down_pose((x, axis[1], z)) for z in (height + length, height)]
         try:
-            (upper_qs, lower_qs), _ = free_kinematics.solve_all(
-                poses, np.zeros(len(lower)), COARSE_ANGLE_STEP
-            )
+            (upper_qs, lower_qs), _ = free_kinematics.solve_all(poses, q_start, COARSE_ANGLE_STEP)
         except Unreachable:
             continue
         upper_qs[:, -1] = lower_qs[:, -1] = kinematics.joint_range.lower[-1]  # The last joint is free.
-        joint_range = free_kinematics.joint_range
-        is_inside = joint_range.contains(upper_qs) & joint_range.contains(lower_qs)
+        is_inside = free_kinematics.joint_range.contains(np.array([upper_qs, lower_qs])).all(axis=0)
         first = lower_qs[is_inside, :1]
         change = wrap_angles(upper_qs[is_inside, :1] - first)
         turned = smallest + (first + direction * ANGLES - smallest) % math.tau

@@ -29,15 +29,7 @@ from executive.cell.arm_config import TOOL_LINK, ArmConfig, ArmFile, FlangeConfi
 from executive.cell.config import CellConfig
 from executive.errors import InputError
 from executive.geometry import Array, Pose, rotate_about_z
-from executive.physics.model_files import (
-    check_files,
-    convert_model,
-    find_mesh,
-    find_references,
-    is_shipped,
-    list_model_files,
-    read_mesh,
-)
+from executive.physics.model_files import check_files, convert_model, find_mesh, is_shipped, read_mesh
 from executive.text.findings import suggest_choice
 from executive.text.validate import KeyPath
 
@@ -106,18 +98,6 @@ def _list_parts(robot: Element, chain: JointChain) -> list[Element]:
         if name in chain.places:
             parts.append(element)
     return parts
-
-
-def list_arm_files(arm: ArmFile) -> list[Path]:
-    """Return the URDF of an arm, and the files that the parts of the arm name.
-
-    Raises:
-        InputError: A file does not exist, or is outside of the folder of the URDF.
-    """
-    path = find_model(arm.urdf)
-    parts = _list_parts(read_robot(path), read_chain(arm.urdf, arm.flange))
-    meshes = [find_mesh(path, element) for part in parts for element in find_references(part)]
-    return [*dict.fromkeys([path, *(file for mesh in meshes for file in list_model_files(mesh))])]
 
 
 def _complete_link(path: Path, link: Element, *, visuals: bool) -> Element:

@@ -20,7 +20,8 @@ import pybullet
 import pybullet_data
 from numpy.typing import ArrayLike, NDArray
 
-from executive.arms.urdf import find_model, parse_numbers, read_origin, read_robot
+from executive.arms.urdf import find_model, parse_numbers, read_chain, read_origin, read_robot
+from executive.cell.arm_config import ArmFile
 from executive.errors import InputError
 from executive.geometry import Array, Pose
 from executive.plugins import find_package_folder
@@ -193,7 +194,20 @@ def find_mesh(urdf: Path, mesh: Element) -> Path:
     return find_model(file)
 
 
-def find_references(part: Element) -> list[Element]:
+def list_arm_files(arm: ArmFile) -> list[Path]:
+    """Return the URDF of an arm, and the files that its links and materials name.
+
+    Raises:
+        InputError: A file does not exist, or is outside of the folder of the URDF.
+    """
+    path = find_model(arm.urdf)
+    places = read_chain(arm.urdf, arm.flange).places
+    parts = [part for part in read_robot(path) if part.tag == "material" or part.get("name") in places]
+    meshes = [find_mesh(path, element) for part in parts for element in _find_references(part)]
+    return [*dict.fromkeys([path, *(file for mesh in meshes for file in list_model_files(mesh))])]
+
+
+def _find_references(part: Element) -> list[Element]:
     """Return the elements in a part of a URDF that name a file which PyBullet opens."""
     return [element for element in part.iter() if element.tag in ("mesh", "texture")]
 
@@ -225,7 +239,7 @@ def list_named_files(path: Path) -> list[Path]:
         # Options of a material may precede the name, and PyBullet reads only one word of some names.
         names = dict.fromkeys(name for value in values for name in (value.strip(), *value.split()))
     elif path.suffix.lower() == ".urdf":
-        names = dict.fromkeys(element.get("filename", "") for element in find_references(read_robot(path)))
+        names = dict.fromkeys(element.get("filename", "") for element in _find_references(read_robot(path)))
     if len(names) > MAX_GROUP_COUNT:
         raise InputError(f"the model {path.name} names more than {MAX_GROUP_COUNT} files; join them")
     # A missing file of another computer, such as D:\colours.png, is no file outside of the folder.

@@ -20,10 +20,10 @@ from executive.mission.cell_file import load_cell
 from executive.mission.load import load_mission
 from executive.motion.configurations import find_configuration_pairs
 from executive.motion.joints import build_kinematics
-from executive.physics.arm_model import find_arm_model_errors, list_arm_files
+from executive.physics.arm_model import find_arm_model_errors
 from executive.physics.cell_world import CellWorld
 from executive.physics.collision import ClearanceChecker, find_self_collision_pairs
-from executive.physics.model_files import list_model_files
+from executive.physics.model_files import list_arm_files, list_model_files
 from executive.station.check import load_checker
 from executive.text.findings import MissionError
 
