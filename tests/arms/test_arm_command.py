@@ -98,6 +98,7 @@ def test_what_is_no_arm_is_refused_with_the_link_or_joint(model: Path) -> None:
         assert (result.exit_code, message in result.stderr) == (2, True), result.stderr
 
 
+@pytest.mark.slow
 def test_a_report_with_a_problem_ends_with_exit_code_2(model: Path) -> None:
     model.write_text(model.read_text().replace('effort="50.0"', 'effort="1"'))
     result = invoke("arm", str(model))
@@ -135,6 +136,7 @@ def test_the_cell_of_a_new_project_passes_its_check(model: Path) -> None:
     check_project("--urdf", "kuka_iiwa/model.urdf", "--flange", "lbr_iiwa_link_7")
 
 
+@pytest.mark.slow
 def test_a_new_project_turns_the_range_of_the_first_joint_to_the_workspace(model: Path) -> None:
     text = model.read_text()
     limit = 'lower="-6.28318530718" upper="6.28318530718"'
@@ -148,6 +150,7 @@ def test_a_new_project_turns_the_range_of_the_first_joint_to_the_workspace(model
     assert "cannot work in the cell of a new project: it does not reach" in result.stderr
 
 
+@pytest.mark.slow
 def test_the_reach_is_measured_from_the_axis_of_the_first_joint(model: Path) -> None:
     text = model.read_text()
     before, joint, after = text.partition('name="world_joint"')
@@ -159,6 +162,7 @@ def test_the_reach_is_measured_from_the_axis_of_the_first_joint(model: Path) -> 
     assert value["best_base"]["position"] == [0.56, -0.34, 0]
 
 
+@pytest.mark.slow
 def test_places_out_of_reach_have_an_advice_that_helps(xarm6: CellConfig) -> None:
     far = with_arm(xarm6, base=BaseConfig())
     ((keys, message),) = find_places_out_of_reach(far)
