@@ -29,7 +29,7 @@ from executive.cell.arm_config import TOOL_LINK, ArmConfig, ArmFile, FlangeConfi
 from executive.cell.config import CellConfig
 from executive.errors import InputError
 from executive.geometry import Array, Pose, rotate_about_z
-from executive.physics.model_files import check_files, convert_model, find_mesh, is_shipped, read_mesh
+from executive.physics.model_files import check_files, convert_model, find_mesh, is_shipped, read_shape
 from executive.text.findings import suggest_choice
 from executive.text.validate import KeyPath
 
@@ -199,16 +199,14 @@ def read_hulls(urdf: str, flange: FlangeConfig) -> Mapping[str, Array]:
         if name not in places:
             continue
         shapes = [
-            read_origin(path, element).apply(
-                _find_extreme_points(path, shape, read_origin(path, element), directions)
-            )
+            read_origin(path, element).apply(read_shape(path, shape, MAX_ARM_TRIANGLE_COUNT)[0])
             for element in link.findall("collision")
             for shape in element.iterfind("geometry/*")
         ]
         if shapes:
-            points = np.array(shapes)  # (S, N, 3): for each of S shapes, a point for each of N directions
-            farthest = (points * directions).sum(axis=2).argmax(axis=0)
-            corners = points[farthest, range(len(directions))]
+            # One shape after the other, because a mesh may have 600,000 vertices.
+            points = np.concatenate([each[(each @ directions.T).argmax(axis=0)] for each in shapes])
+            corners = points[(points @ directions.T).argmax(axis=0)]
             size = float(np.abs(corners).max())
             if size > MAX_HULL_SIZE:
                 advice = 'lengths are in metres; add scale="0.001 0.001 0.001" to a mesh in millimetres'
@@ -223,29 +221,6 @@ def _spread_directions(count: int) -> Array:
     angles = np.arange(count) * math.pi * (3.0 - math.sqrt(5.0))
     radius = np.sqrt(1.0 - z**2)
     return np.stack([radius * np.cos(angles), radius * np.sin(angles), z], axis=1)
-
-
-def _find_extreme_points(path: Path, shape: Element, X_LS: Pose, directions: Array) -> Array:
-    """Return the farthest point of a shape in each of `N` directions in the link's frame, `(N, 3)` [m]."""
-    d = directions @ X_LS.rotation
-    if shape.tag == "mesh":
-        vertices, _ = read_mesh(find_mesh(path, shape), MAX_ARM_TRIANGLE_COUNT)
-        vertices = vertices * parse_numbers(path, shape, "scale", (1.0, 1.0, 1.0), 0.0)
-        return np.asarray(vertices[(vertices @ d.T).argmax(axis=0)])
-    if shape.tag == "box":
-        return np.sign(d) * np.array(parse_numbers(path, shape, "size", (0.0, 0.0, 0.0), 0.0)) / 2
-    if shape.tag not in ("cylinder", "sphere", "capsule"):
-        problem = f"{describe_place(path, shape)} has the geometry <{shape.tag}>"
-        raise InputError(f"{problem}; possible are box, cylinder, sphere, capsule and mesh")
-    (radius,) = parse_numbers(path, shape, "radius", (0.0,), 0.0)
-    length = 0.0
-    if shape.tag != "sphere":
-        (length,) = parse_numbers(path, shape, "length", (0.0,), 0.0)
-    ends = np.sign(d[:, 2:]) * [0.0, 0.0, length / 2]
-    if shape.tag == "cylinder":
-        flat = d * [1.0, 1.0, 0.0]
-        d = flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-9)
-    return np.asarray(radius * d + ends)
 
 
 def _check_parts(path: Path, robot: Element) -> None:
@@ -268,7 +243,7 @@ def _check_parts(path: Path, robot: Element) -> None:
             if len(shapes) != 1:
                 problem = f"{describe_place(path, element)} has {len(shapes)} shapes in a <{element.tag}>"
                 raise InputError(f"{problem}; write one <geometry> with one shape")
-            _find_extreme_points(path, shapes[0], Pose.identity(), _spread_directions(1))
+            read_shape(path, shapes[0], MAX_ARM_TRIANGLE_COUNT)
 
 
 def find_arm_model_errors(arm: ArmFile) -> Iterator[tuple[KeyPath, str]]:

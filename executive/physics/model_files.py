@@ -20,7 +20,14 @@ import pybullet
 import pybullet_data
 from numpy.typing import ArrayLike, NDArray
 
-from executive.arms.urdf import find_model, parse_numbers, read_chain, read_origin, read_robot
+from executive.arms.urdf import (
+    describe_place,
+    find_model,
+    parse_numbers,
+    read_chain,
+    read_origin,
+    read_robot,
+)
 from executive.cell.arm_config import ArmFile
 from executive.errors import InputError
 from executive.geometry import Array, Pose
@@ -115,7 +122,7 @@ def read_shapes(path: Path, tag: str) -> Triangles:
     for element in root.iterfind(f"link/{tag}"):
         X_LE = read_origin(path, element)
         for shape in element.iterfind("geometry/*"):
-            points, faces = _read_shape(path, shape)
+            points, faces = read_shape(path, shape)
             triangles.append(faces + sum(map(len, vertices)))  # indices count the vertices of earlier shapes
             vertices.append(X_LE.apply(points))
     link_count, inertial_count = (len(root.findall(key)) for key in ("link", "link/inertial"))
@@ -126,13 +133,13 @@ def read_shapes(path: Path, tag: str) -> Triangles:
     return np.concatenate(vertices), np.concatenate(triangles)
 
 
-def _read_shape(path: Path, shape: Element) -> Triangles:
+def read_shape(path: Path, shape: Element, max_triangle_count: float = MAX_TRIANGLE_COUNT) -> Triangles:
     """Return vertices and triangles of an element below `geometry` of a URDF."""
     if shape.tag == "mesh":
-        points, faces = read_mesh(find_mesh(path, shape))
+        points, faces = read_mesh(find_mesh(path, shape), max_triangle_count)
         return points * parse_numbers(path, shape, "scale", (1.0, 1.0, 1.0), 0.0), faces
     if shape.tag not in ("box", "cylinder", "sphere", "capsule"):
-        problem = f"the model {path.name} has the geometry <{shape.tag}>"
+        problem = f"{describe_place(path, shape)} has the geometry <{shape.tag}>"
         raise InputError(f"{problem}; possible are box, cylinder, sphere, capsule and mesh")
     from trimesh import creation  # the import takes a second
 

@@ -308,7 +308,7 @@ BROKEN = [
     (edit(SHAPE_3, '<box size="0.08 0.2"/>'), OF_LINK_3 + 'has size="0.08 0.2" in a <box>; write 3'),
     (edit(SHAPE_3, "<sphere/>"), OF_LINK_3 + 'has radius="" in a <sphere>; write 1'),
     (edit(SHAPE_3, '<sphere radius="-0.04"/>'), OF_LINK_3 + 'has radius="-0.04" in a <sphere>'),
-    (edit(SHAPE_3, '<sphere radius="40"/>'), OF_LINK_3 + "is 39.9 m long: lengths are in metres"),
+    (edit(SHAPE_3, '<sphere radius="40"/>'), OF_LINK_3 + "is 40 m long: lengths are in metres"),
     (edit(SHAPE_3, ""), OF_LINK_3 + "has 0 shapes in a <collision>"),
     (edit("</link>", VISUAL.format("<plane/>", "")), "has the geometry <plane>"),
     # The files that the URDF names.
