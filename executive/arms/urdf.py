@@ -133,18 +133,17 @@ def parse_numbers(
 
 def make_rotation(roll: float, pitch: float, yaw: float) -> Array:
     """Return the rotation matrix for the angles in a URDF [rad]: about the fixed axes x, then y, then z."""
-    cr, cp = np.cos([roll, pitch])
-    sr, sp = np.sin([roll, pitch])
-    about_x = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
-    about_y = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
+    # A permutation of the axes turns a rotation about z into one about x or y.
+    about_x = np.roll(rotate_about_z(roll), (1, 1), axis=(0, 1))
+    about_y = np.roll(rotate_about_z(pitch), (-1, -1), axis=(0, 1))
     return np.asarray(rotate_about_z(yaw) @ about_y @ about_x)
 
 
 def read_origin(path: Path, element: Element) -> Pose:
     """Return the pose in the `origin` of an element of a URDF."""
     origin = next(element.iter("origin"), Element("origin"))
-    xyz, rpy = (parse_numbers(path, origin, key, (0.0, 0.0, 0.0)) for key in ("xyz", "rpy"))
-    return Pose(make_rotation(*rpy), np.array(xyz))
+    rotation = make_rotation(*parse_numbers(path, origin, "rpy", (0.0, 0.0, 0.0)))
+    return Pose(rotation, np.array(parse_numbers(path, origin, "xyz", (0.0, 0.0, 0.0))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -363,7 +362,8 @@ def _read_limits(path: Path, joint: Element) -> tuple[float, float, float, float
         lower = -math.tau
         upper = math.tau
     elif lower == upper == 0.0:
-        lower = upper = math.nan
+        lower = math.nan
+        upper = math.nan
     place = f'the joint "{joint.get("name")}" of the model {path.name}'
     if max(abs(lower), abs(upper)) > MAX_JOINT_POSITION:
         problem = f"{place} has the limits {lower:g} to {upper:g} rad"

@@ -74,7 +74,8 @@ def list_places(config: CellConfig) -> list[Place]:
     In the workspace, the tool reaches the lowest class; elsewhere, it descends from travel height to the
     height at which it releases the highest load.
     """
-    xs, ys = (np.linspace(*side, POINTS_PER_SIDE) for side in (config.table.x, config.table.y))
+    xs = np.linspace(*config.table.x, POINTS_PER_SIDE)
+    ys = np.linspace(*config.table.y, POINTS_PER_SIDE)
     workspace = np.array([(x, y) for x in xs for y in ys])
     min_height = min(section.height for section in config.objects.values())
     places = [Place(("table",), WORKSPACE, workspace, min_height, config.motion.descent)]
@@ -181,14 +182,15 @@ def measure_reach(config: CellConfig, kinematics: Kinematics) -> Reach:
     shifts.sort(key=lambda shift: float(np.linalg.norm(shift)))
     moves = [(0.0, shift) for shift in shifts if _is_free(config, axis + shift)] or [(0.0, np.zeros(2))]
     middle = np.angle((masks[places[0].height, places[0].length] @ np.exp(1j * ANGLES)).sum())
-    x, y = (places[0].points.mean(axis=0) - axis - np.array([shift for _, shift in moves])).T
-    turns = ANGLES[1] * np.round(wrap_angles(np.arctan2(y, x) - middle) / ANGLES[1])
+    ways = places[0].points.mean(axis=0) - axis - np.array([shift for _, shift in moves])
+    azimuths = np.arctan2(ways[:, 1], ways[:, 0])
+    turns = ANGLES[1] * np.round(wrap_angles(azimuths - middle) / ANGLES[1])
     moves += [(float(turn), shift) for turn, (_, shift) in zip(turns, moves, strict=True)]
     turn, shift = max(moves, key=rate)
     base = config.arm.base
-    x, y = (axis + shift + rotate_about_z(turn)[:2, :2] @ (base.position[:2] - axis)).round(3).tolist()
+    position = axis + shift + rotate_about_z(turn)[:2, :2] @ (base.position[:2] - axis)
     yaw = math.degrees(wrap_angles(np.array(math.radians(base.yaw_deg) + turn)))
-    best = BaseConfig(position=(x, y, base.position[2]), yaw_deg=round(yaw, 3))
+    best = BaseConfig(position=(*position.round(3).tolist(), base.position[2]), yaw_deg=round(yaw, 3))
     arm = config.arm.model_copy(update={"base": best})
     fractions = _compute_fractions(places, kinematics)
     best_kinematics = build_planning_kinematics(config.model_copy(update={"arm": arm}))
@@ -228,13 +230,16 @@ def _find_reachable_turns(
     if direction == 0:
         return mask
     # The solutions in one direction are turned to all others, so that the first joint must be free there.
-    lower, upper = zip(*config.arm.limits.position_ranges_deg, strict=True)
-    ranges = {"min_position_deg": (-360.0, *lower[1:]), "position_deg": (360.0, *upper[1:])}
-    arm = config.arm.model_copy(update={"limits": config.arm.limits.model_copy(update=ranges)})
+    ranges = ((-360.0, 360.0), *config.arm.limits.position_ranges_deg[1:])
+    free_limits = {
+        "min_position_deg": tuple(lower for lower, _ in ranges),
+        "position_deg": tuple(upper for _, upper in ranges),
+    }
+    arm = config.arm.model_copy(update={"limits": config.arm.limits.model_copy(update=free_limits)})
     free_kinematics = build_planning_kinematics(config.model_copy(update={"arm": arm}))
     smallest = kinematics.joint_range.lower[0]
     largest = kinematics.joint_range.upper[0]
-    q_start = np.zeros(len(lower))
+    q_start = np.zeros(len(ranges))
     for row in range(len(mask) - 1):
         x = axis[0] + RADIUS_STEP * (row + 1)
         poses = [make_tool_down_pose((x, axis[1], z)) for z in (height + length, height)]
@@ -242,7 +247,9 @@ def _find_reachable_turns(
             (upper_qs, lower_qs), _ = free_kinematics.solve_all(poses, q_start, COARSE_ANGLE_STEP)
         except Unreachable:
             continue
-        upper_qs[:, -1] = lower_qs[:, -1] = kinematics.joint_range.lower[-1]  # The last joint is free.
+        # The last joint is free.
+        upper_qs[:, -1] = kinematics.joint_range.lower[-1]
+        lower_qs[:, -1] = kinematics.joint_range.lower[-1]
         is_inside = free_kinematics.joint_range.contains(np.array([upper_qs, lower_qs])).all(axis=0)
         first = lower_qs[is_inside, :1]
         change = wrap_angles(upper_qs[is_inside, :1] - first)
@@ -254,8 +261,8 @@ def _find_reachable_turns(
 
 def _is_free(config: CellConfig, base: Array) -> bool:
     """Return True if a base at a position `(2,)` [m] stands neither in the workspace nor in a bin."""
-    low, high = np.array([config.table.x, config.table.y]).T
-    areas = [(low, high)]
+    table = np.array([config.table.x, config.table.y])
+    areas = [(table[:, 0], table[:, 1])]
     for bin in config.bins.values():
         centre = np.array(bin.position[:2])
         half_size = np.array(bin.size[:2]) / 2

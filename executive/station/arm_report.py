@@ -180,8 +180,8 @@ def _describe_solver(config: CellConfig, kinematics: Kinematics) -> str:
             with contextlib.suppress(Unreachable):
                 find_configuration_pairs(solver, Goal((x, y, z)), 0.0, np.zeros(config.arm.joint_count))
                 counts[solver] += 1
-    found, expected = counts.values()
-    return f"{name}, which reaches {found} of {COMPARED_POSE_COUNT} poses (numerical search: {expected})"
+    numbers = f"{counts[kinematics]} of {COMPARED_POSE_COUNT} poses (numerical search: {counts[numeric]})"
+    return f"{name}, which reaches {numbers}"
 
 
 def draw_reach(report: ArmReport) -> NDArray[np.uint8]:
@@ -189,13 +189,14 @@ def draw_reach(report: ArmReport) -> NDArray[np.uint8]:
     config = report.config
     low = np.array([-0.5, -0.9])
     size = np.array([1.5, 1.8])
-    height, width = (size * PIXELS_PER_METRE).astype(int)
+    height = int(size[0] * PIXELS_PER_METRE)
+    width = int(size[1] * PIXELS_PER_METRE)
     image = np.full((height, width, 3), 255, np.uint8)
 
     def to_pixel(point: Sequence[float] | Array) -> tuple[int, int]:
         """Return column and row: x points up and y to the left, as seen from the base."""
-        x, y = (np.asarray(point)[:2] - low) * PIXELS_PER_METRE
-        return width - int(y), height - int(x)
+        offset = (np.asarray(point)[:2] - low) * PIXELS_PER_METRE
+        return width - int(offset[1]), height - int(offset[0])
 
     rows, columns = np.mgrid[:height, :width]
     points = np.stack([height - rows, width - columns], axis=-1) / PIXELS_PER_METRE + low
@@ -205,9 +206,9 @@ def draw_reach(report: ArmReport) -> NDArray[np.uint8]:
         column, row = to_pixel(point)
         cv2.putText(image, text, (column + 10, row), cv2.FONT_HERSHEY_SIMPLEX, 0.45, DARK, 1, cv2.LINE_AA)
 
-    low_corner, high_corner = np.array([config.table.x, config.table.y]).T
-    cv2.rectangle(image, to_pixel(low_corner), to_pixel(high_corner), DARK, 2)
-    write(f"workspace {report.reach.fractions[WORKSPACE]:.0%}", (low_corner[0], high_corner[1]))
+    table = np.array([config.table.x, config.table.y])
+    cv2.rectangle(image, to_pixel(table[:, 0]), to_pixel(table[:, 1]), DARK, 2)
+    write(f"workspace {report.reach.fractions[WORKSPACE]:.0%}", (table[0, 0], table[1, 1]))
     for name, bin in config.bins.items():
         centre = np.array(bin.position[:2])
         half = np.array(bin.size[:2]) / 2
