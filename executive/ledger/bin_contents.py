@@ -97,14 +97,6 @@ class BinContents:
     known_bins: set[str] = field(default_factory=set)
     views: dict[str, BinView] = field(default_factory=dict)
 
-    @property
-    def assumption(self) -> str:
-        """Sentence on the bins that no image showed completely after a placement; "" if there is none."""
-        used_bins = {record.bin for record in self.records.filter_by_state(State.PLACED)}
-        shown_bins = {name for name, view in self.views.items() if view.items}
-        unseen_bins = sorted(used_bins - shown_bins - {""})
-        return f"no image showed all that lies in {', '.join(unseen_bins)}" if unseen_bins else ""
-
     def count_objects_in(self, bin_name: str, label: str | None = None) -> int:
         """Return the number of items that were released in a bin or have probably fallen into the bin.
 

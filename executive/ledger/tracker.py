@@ -274,11 +274,15 @@ class Tracker:
                 self.unexplained.report(f"bin {name}", appearance.contradiction, frame=frame.id)
 
     def set_final_states(self, *, completed: bool) -> None:
+        used_bins = {record.bin for record in self._records.filter_by_state(State.PLACED)}
+        shown_bins = {name for name, view in self._bin_contents.views.items() if view.items}
+        if unseen_bins := sorted(used_bins - shown_bins - {""}):
+            self.assumption_reasons.append(f"no image showed all that lies in {', '.join(unseen_bins)}")
         for name, view in self._bin_contents.views.items():
             if view.change:
                 self.unexplained.report(f"contents {name}", view.change)
-        assumptions = (self._bin_contents.assumption, self._load_cell.assumption)
-        self.assumption_reasons += filter(None, assumptions)
+        if assumption := self._load_cell.assumption:
+            self.assumption_reasons.append(assumption)
         set_final_states(
             self._records, self._certainty, self._explain_skipped_item, self.unknown_labels,
             is_completed=completed,

@@ -138,6 +138,12 @@ class Unexplained:
         if all(entry.is_settled for entry in self._entries.values()):
             self._unsettled_look_count = 0
 
+    def _open(self, key: str) -> Entry:
+        """Return a new entry with the next name; the caller emits its first event."""
+        self._count += 1
+        self._entries[key] = Entry(UnexplainedChanged(f"unexplained-{self._count}", "", []))
+        return self._entries[key]
+
     def explain(self, position: Array, max_distance: float) -> bool:
         """Close the settled regions within `max_distance` [m] of an item; return True if there was one."""
         keys = [
@@ -150,12 +156,6 @@ class Unexplained:
         for key in keys:
             self._close(key)
         return bool(keys)
-
-    def _open(self, key: str) -> Entry:
-        """Return a new entry with the next name; the caller emits its first event."""
-        self._count += 1
-        self._entries[key] = Entry(UnexplainedChanged(f"unexplained-{self._count}", "", []))
-        return self._entries[key]
 
     def _close(self, key: str) -> None:
         """Close the entry with a key, if there is one."""
