@@ -249,7 +249,7 @@ def _choose_layout(arm: ArmFile) -> tuple[Mapping[str, Any], CellConfig]:
     from executive.mission.cell_file import load_cell
     from executive.motion.joints import build_planning_kinematics
     from executive.motion.reach import find_fitting_speed, measure_reach
-    from executive.station.arm_report import place_arm, report_arm
+    from executive.station.arm_report import find_blocked_motions, place_arm, report_arm
     from executive.station.check import load_checker
     from executive.text.files import find_cell
 
@@ -275,6 +275,7 @@ def _choose_layout(arm: ArmFile) -> tuple[Mapping[str, Any], CellConfig]:
             motion = config.motion.model_copy(update={"descent_speed": find_fitting_speed(config)})
             config = config.model_copy(update={"motion": motion})
             problems = [message for _, message in load_checker(config.kind).check(config, path.parent)]
+            problems = problems or [*find_blocked_motions(config)]
         if not problems:
             return layout, config
     advice = "start with `executive init` without --urdf, and change table, bins and arm in its cell"
@@ -335,6 +336,8 @@ def init_command(folder: Path, name: str | None, urdf: str, flange: str) -> None
     contains a copy of the model, an arm file, and a cell with this arm.
     """
     package = make_package_name(folder) if name is None else check_package_name(name, f'--name "{name}"')
+    if flange and not urdf:
+        raise InputError("--flange names a link of a URDF; name the URDF with --urdf")
     if urdf:
         with shared.keep_stdout_clean():
             files = _write_project_with_arm(folder, package, urdf, flange)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,14 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.arms.urdf import JointChain, propose_flange, read_chain
-from executive.cell.arm import Goal
+from executive.cell.arm import Goal, Task
 from executive.cell.arm_config import ArmConfig, ArmFile, BaseConfig
 from executive.cell.config import CellConfig
-from executive.errors import InputError, Unreachable
+from executive.errors import Blocked, InputError, Unreachable
 from executive.geometry import Array
+from executive.manipulation.tool_goals import make_slot_goal
 from executive.motion.configurations import find_configuration_pairs
-from executive.motion.joints import Kinematics, build_planning_kinematics
-from executive.motion.reach import WORKSPACE, Reach, format_bin, measure_reach
+from executive.motion.joints import Kinematics, build_planning_kinematics, wrap_angles
+from executive.motion.planner import Planner
+from executive.motion.reach import POINTS_PER_SIDE, WORKSPACE, Reach, format_bin, list_places, measure_reach
 from executive.station.camera import CellCamera, Robot
 from executive.station.check import StillRobot, find_payload_errors
 from executive.text.validate import join_keys
@@ -41,6 +43,8 @@ POSE_GRID = (np.linspace(-0.1, 0.7, 9), np.linspace(-0.6, 0.6, 13), (0.05, 0.2, 
 """Positions of the tool for proposed poses: x and y from the base, z from the travel height [m]."""
 TURN_WEIGHT = 1e-3
 """Weight of the largest joint position: of equally good configurations, the least turned one is best."""
+MAX_CONFIGURATION_CHANGE = 1.2
+"""Maximum difference of a joint, except the first and the last one, between similar configurations [rad]."""
 JACOBIAN_STEP = 1e-5
 """Step of a joint for a numerical derivative [rad]."""
 PIXELS_PER_METRE = 400
@@ -121,7 +125,8 @@ def propose_poses(config: CellConfig, kinematics: Kinematics, checker: Any) -> d
     """Return joint positions [degree] with the tool down and the table in view: `home` and `aside`.
 
     Each pose keeps the margin to everything, and is far from joint limits and singular configurations, `home`
-    at positive y, and `aside` at negative y. Without any such pose, the result is empty.
+    at positive y, and `aside` at negative y in a similar configuration, because the arm may have no way from
+    one configuration to another. Without any such pose, the result is empty.
     """
     robot: Any = StillRobot(config)
     camera = CellCamera(config, robot, Robot(robot, robot), Robot(robot, robot), kinematics)
@@ -129,13 +134,18 @@ def propose_poses(config: CellConfig, kinematics: Kinematics, checker: Any) -> d
     middle = (lower + upper) / 2
     base = np.array(config.arm.base.position)
     best: dict[str, tuple[float, Array]] = {}
-    xs, ys, zs = POSE_GRID
-    for x, y, z in np.array(np.meshgrid(xs, ys, zs)).reshape(3, -1).T.tolist():
+    grid = np.array(np.meshgrid(*POSE_GRID)).reshape(3, -1).T.tolist()
+    for x, y, z in sorted(grid, key=lambda point: point[1] < 0):
         name = "home" if y >= 0 else "aside"
         goal = Goal((base[0] + x, base[1] + y, config.travel_height + z))
         try:
             qs = find_configuration_pairs(kinematics, goal, 0.0, middle).lower_qs
         except Unreachable:
+            continue
+        if name == "aside" and "home" in best:
+            change = wrap_angles(qs - best["home"][1])[:, 1:-1]
+            qs = qs[np.abs(change).max(axis=1) <= MAX_CONFIGURATION_CHANGE]
+        if not len(qs):
             continue
         scores = [_rate_configuration(kinematics, each, lower, upper) for each in qs]
         score = max(scores)
@@ -148,6 +158,32 @@ def propose_poses(config: CellConfig, kinematics: Kinematics, checker: Any) -> d
     if "aside" in best:
         best.setdefault("home", best["aside"])
     return {name: np.degrees(best[name][1]).round(1).tolist() for name in ("home", "aside") if name in best}
+
+
+def find_blocked_motions(config: CellConfig) -> Iterator[str]:
+    """Yield a clause for each motion between pose, workspace and bin that the planner does not find.
+
+    An arm may reach all places, but some of them only in configurations between which it has no way.
+    """
+    planner = Planner(config)
+    workspace = list_places(config)[0]
+    load = max(config.build_classes().values(), key=lambda each: each.height)
+    hold_height = config.tool.get_hold_height(load)
+    slots = {
+        name: make_slot_goal(bin, 0, hold_height, load.height) for name, bin in config.build_bins().items()
+    }
+    task = Task(load, config.tool.max_holding_force)
+    for pose_name, pose in config.arm.poses_deg.items():
+        for x, y in workspace.points[:: POINTS_PER_SIDE - 1].tolist():
+            motion = f'from the pose "{pose_name}" to ({x:g}, {y:g}) m'
+            goal = Goal((x, y, workspace.height), (), config.motion.descent, config.motion.descent_speed)
+            try:
+                q = planner.plan(np.radians(pose), goal).end
+                for bin_name, slot in slots.items():
+                    motion = f'from ({x:g}, {y:g}) m to the bin "{bin_name}"'
+                    planner.plan(q, slot, task)
+            except (Blocked, Unreachable) as error:
+                yield f"there is no motion {motion}: {error}"
 
 
 def _rate_configuration(kinematics: Kinematics, q: Array, lower: Array, upper: Array) -> float:
