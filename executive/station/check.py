@@ -107,6 +107,7 @@ def find_pose_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     """
     # The import loads PyBullet, which takes 0.2 s; a cell without physics does not need it.
     from executive.physics.arm_model import find_arm_model_errors
+    from executive.physics.cell_world import LINK_A
     from executive.physics.collision import ClearanceChecker
 
     if model_errors := tuple(find_arm_model_errors(config.arm)):
@@ -122,6 +123,11 @@ def find_pose_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
                 message = f'the pose "{name}" brings {violation}; {margin}'
                 yield ("arm", "poses_deg", name), message
         yield from find_payload_errors(config, checker.world, config.arm.poses_deg)
+        for name, body in checker.world.bin_bodies.items():
+            # No motion can change this, so that the check of motions leaves it out.
+            points = checker.world.client.getClosestPoints(checker.world.arm, body, 0.0)
+            if any(checker.world.joint_counts[point[LINK_A]] == 0 for point in points):
+                yield ("arm", "base"), f'the base of the arm stands in the bin "{name}"; move one of them'
         yield from _find_occluding_poses_and_bins(config, checker.world)
 
 
