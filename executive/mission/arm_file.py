@@ -24,7 +24,7 @@ LIMIT_KEYS = tuple(key for key in LimitsConfig.model_fields if key != "source")
 """Keys of `limits` with one value for each joint."""
 MAX_ANGLE_DEG = 360.0
 """Maximum position of a joint [degree]; a joint that turns further is limited to it."""
-RANGES = {"velocity_deg": (1.0, 1000.0), "effort": (0.1, 1e5)}
+RANGES = {"velocity_deg": (5.0, 1000.0), "effort": (0.1, 1e5)}
 """Smallest and largest value of a joint that an arm file may contain [degree/s, Nm]; NaN is in no range."""
 
 
@@ -52,8 +52,9 @@ def complete_arm(root: YamlMapping, folder: Path) -> tuple[YamlMapping, list[Fin
         place = ("flange", "link") if isinstance(error, WrongFlange) else ("urdf",)
         return root, [make_error(find_span(root, place), "robot", str(error))]
     count = len(chain.joints)
-    limits = _add_values(limits, {key: _repeat(limits.get(key), count) for key in LIMIT_KEYS})
-    root = _add_values(root, {"limits": limits, "effort": _repeat(root.get("effort"), count)})
+    root = repeat_numbers(root, count)
+    limits = root.get("limits")
+    assert isinstance(limits, YamlMapping), "checked above"
     values_by_key: dict[KeyPath, YamlNode | None] = {("limits", key): limits.get(key) for key in LIMIT_KEYS}
     values_by_key["effort",] = root.get("effort")
     for keys, values in values_by_key.items():
@@ -64,6 +65,14 @@ def complete_arm(root: YamlMapping, folder: Path) -> tuple[YamlMapping, list[Fin
             )
             return root, [make_error(find_span(root, keys), "robot", message)]
     return _insert_limits(root, limits, chain, urdf)
+
+
+def repeat_numbers(arm: YamlMapping, count: int) -> YamlMapping:
+    """Return the tree of an arm with equal numbers where a key has one number for all joints."""
+    limits = arm.get("limits")
+    if isinstance(limits, YamlMapping):
+        limits = _add_values(limits, {key: _repeat(limits.get(key), count) for key in LIMIT_KEYS})
+    return _add_values(arm, {"limits": limits, "effort": _repeat(arm.get("effort"), count)})
 
 
 def read_arm_file(source: Source, folder: Path) -> tuple[YamlMapping, ArmFile]:

@@ -15,7 +15,7 @@ from executive.cell.config import BinConfig, CellConfig, ObjectConfig
 from executive.cell.objects import BIN_THICKNESS
 from executive.errors import InputError
 from executive.geometry import Array
-from executive.mission.arm_file import read_arm_file
+from executive.mission.arm_file import read_arm_file, repeat_numbers
 from executive.plugins import PACKAGE_PREFIX
 from executive.text.files import describe_outside_path, find_file_below, read_source
 from executive.text.findings import Finding, MissionError, Source, Span, make_error, sort_findings
@@ -186,6 +186,7 @@ class _CellFileReader:
             self.findings.append(make_error(urdf.span, "no-arm", message))
             return None
         completing_root = _omit_entry(arm_root, "limits") if is_default else arm_root
+        arm = repeat_numbers(arm, arm_file.joint_count)
         return root.with_value("arm", _merge_sections(arm, completing_root))
 
     def arrange_matrices(self, node: YamlNode, keys: KeyPath = ()) -> YamlNode:
