@@ -386,7 +386,7 @@ def propose_flange(urdf: str, link: str = "") -> FlangeConfig:
     before several joints branch off, as in a gripper.
 
     Raises:
-        InputError: No link can be the flange; the message names the reason for the last one.
+        InputError: The chain has an error, or no link can be the flange; the message names the reason.
     """
     path = find_model(urdf)
     robot = read_robot(path)
@@ -411,13 +411,14 @@ def propose_flange(urdf: str, link: str = "") -> FlangeConfig:
     longest = [name for name, count in counts.items() if count == max(counts.values(), default=0) > 0]
     longest.sort(key=lambda each: links[each].find("collision") is not None)
     candidates = [link] if link else longest
-    error = InputError(f"the model {path.name} has no chain of revolute joints without branches")
+    errors = [InputError(f"the model {path.name} has no chain of revolute joints without branches")]
     for rotation in FLANGE_ROTATIONS_DEG:
         for each in candidates:
             try:
                 flange = FlangeConfig(link=each, rotation_deg=rotation)
                 read_chain(urdf, flange)
                 return flange
-            except InputError as problem:
-                error = problem
-    raise error
+            except InputError as error:
+                errors.append(error)
+    # A wrong flange may only be the consequence of the rotations that were tried.
+    raise next((error for error in errors[1:] if not isinstance(error, WrongFlange)), errors[-1])
