@@ -288,7 +288,9 @@ def keep_stdout_clean() -> Iterator[None]:
 
 def print_json(value: Any) -> None:
     """Print `value` to stdout as one JSON object or array."""
-    click.echo(json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False))
+    # Another encoding than UTF-8 lacks most characters.
+    is_ascii_only = sys.stdout.encoding.lower() not in ("utf-8", "utf8")
+    click.echo(json.dumps(value, indent=2, ensure_ascii=is_ascii_only, allow_nan=False))
 
 
 def print_result(value: Any, text: str, *, as_json: bool) -> None:

@@ -107,6 +107,13 @@ print_json([1])
     assert done.stderr == "from Python\n"
 
 
+def test_json_stays_valid_where_the_terminal_knows_no_other_characters():
+    code = "from executive.cli.shared import print_json; print_json(['ärm 手'])"
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, env=environment, check=True)
+    assert json.loads(done.stdout.decode("ascii")) == ["ärm 手"]
+
+
 def test_check_tells_what_can_still_end_the_mission(project):
     project.endings = (
         UnhandledFailure("Detect", "hidden", "tree/look/Detect", "sort.yaml", 9),
