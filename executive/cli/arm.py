@@ -107,6 +107,8 @@ def read_arm(file: str, flange: str = "", target: Path | None = None) -> tuple[A
         arm = load_arm(source, path.parent)
     except MissionError as error:  # The lines of the findings are in no file.
         raise InputError("\n".join(f"{file}: {each.message}" for each in error.findings)) from None
+    if target is not None and target.suffix not in (".yaml", ".yml"):
+        raise InputError(f"{target} is no name of an arm file; name a file that ends with .yaml")
     if target is not None and target.exists():
         raise InputError(f"{target} exists; name a new file, or delete it first")
     if target is None or not is_file:
