@@ -239,7 +239,8 @@ def resume_run(path: Path, skills: Skills, options: RunOptions, record: RecordOp
         replay = replay_and_compare(loaded, compared_log, start.seed)
         problem = "" if lacks_only_result else compared_log.find_lost_value()
         if not replay.is_equal:
-            problem = f"{replay.difference}. The executive or a skill has changed, or has unrecorded inputs"
+            cause = "The executive, a skill or a model has changed, or a skill has unrecorded inputs"
+            problem = f"{replay.difference}. {cause}"
         if problem:
             advice = "run the mission again, or install the version that recorded the run"
             raise InputError(f'the run in "{path}" cannot be resumed: {problem}; {advice}')
