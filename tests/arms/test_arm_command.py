@@ -28,7 +28,8 @@ from executive.motion.reach import find_braking_errors, find_places_out_of_reach
 from executive.physics.arm_model import ArmHulls
 from executive.physics.cell_world import CellWorld
 from executive.plugins import find_package_folder
-from executive.station.check import find_payload_errors, load_checker
+from executive.station.arm_report import find_blocked_motions
+from executive.station.check import find_payload_errors, find_pose_errors, load_checker
 from executive.text.files import get_shipped_folder
 
 SHIPPED = get_shipped_folder()
@@ -252,3 +253,64 @@ def test_a_model_in_a_package_stays_in_its_folder(monkeypatch: pytest.MonkeyPatc
     ):
         with pytest.raises(InputError, match=message):
             find_model(reference)
+
+
+def test_the_reason_about_a_joint_comes_before_that_about_the_flange(model: Path) -> None:
+    model.write_text(model.read_text().replace('lower="-2.059" upper="2.0944"', 'lower="-118" upper="120"'))
+    result = invoke("arm", str(model))
+    assert result.exit_code == 2
+    assert "has the limits -118 to 120 rad; angles in a URDF are in radians" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (("arm", "bench/xarm6_with_gripper.urdf", "--write", "arm.txt"), "name a file that ends with .yaml"),
+        (("init", "hall", "--flange", "link6"), "name the URDF with --urdf"),
+    ],
+)
+def test_what_a_command_would_ignore_is_an_error(model: Path, words: tuple[str, ...], text: str) -> None:
+    result = invoke(*words)
+    assert result.exit_code == 2
+    assert text in result.stderr
+
+
+SLOW_CELL = """\
+base: overhead.yaml
+cell: slow
+arm:
+  file: arms/iiwa14.yaml
+  limits: {acceleration: 2}
+  effort: 99
+  poses_deg: {home: [0, 0, 0, 0, 0, 0, 0], aside: [9, 0, 0, 0, 0, 0, 0]}
+"""
+
+
+def test_a_cell_may_have_one_number_for_all_joints(tmp_path: Path) -> None:
+    path = tmp_path / "slow.yaml"
+    path.write_text(SLOW_CELL)
+    shutil.copy(SHIPPED / "cells" / "overhead.yaml", tmp_path)
+    arm = load_cell(path).arm
+    assert (set(arm.limits.acceleration), set(arm.effort), len(arm.effort)) == ({2.0}, {99.0}, 7)
+
+
+def test_a_base_in_a_bin_is_an_error(xarm6: CellConfig) -> None:
+    red_bin = xarm6.bins["red_bin"].model_copy(update={"position": (0.16, -0.16, 0.0)})
+    moved = xarm6.model_copy(update={"bins": {**xarm6.bins, "red_bin": red_bin}})
+    messages = dict(find_pose_errors(moved))
+    assert messages["arm", "base"].startswith('the base of the arm stands in the bin "red_bin"')
+    assert ("arm", "base") not in dict(find_pose_errors(xarm6))
+
+
+@pytest.mark.slow
+def test_places_between_which_an_arm_has_no_way_are_found(xarm6: CellConfig) -> None:
+    assert not list(find_blocked_motions(xarm6))
+    lower, upper = np.array(xarm6.arm.limits.position_ranges_deg).T
+    # The pose `aside` is in a configuration that turns the tool round, and joint 4 cannot turn back.
+    flipped = [-59.0, 24.0, -88.4, 180.0, -64.4, 0.0]
+    lower[3] = 170.0
+    limits = xarm6.arm.limits.model_copy(
+        update={"min_position_deg": tuple(lower.tolist()), "position_deg": tuple(upper.tolist())}
+    )
+    changed = with_arm(xarm6, limits=limits, poses_deg={"home": tuple(flipped)})
+    assert any("there is no motion from" in message for message in find_blocked_motions(changed))
