@@ -17,9 +17,8 @@ TOOL_LINK = "tool"
 """Name of the link of the tool in an arm file and in the simulated arm."""
 MIN_JOINT_RANGE = 2.0
 """Minimum range of a joint's positions [degree]; a joint with a smaller range is regarded as fixed."""
-Speed = Annotated[float, Field(ge=5, le=1000)]
-"""Joint velocity [degree/s]; at 5 degree/s, a motion takes 14 s, and a guarded descent needs most of it; the
-fastest arms reach 1000 degree/s."""
+Speed = Annotated[float, Field(ge=1, le=1000)]
+"""Joint velocity [degree/s]; the fastest arms reach 1000 degree/s."""
 Acceleration = Annotated[float, Field(ge=0.1, le=1000)]
 """Joint acceleration [rad/s²]; at 0.1 rad/s², a motion takes minutes; the fastest arms reach 100 rad/s²."""
 Jerk = Annotated[float, Field(ge=1, le=1e5)]

@@ -24,7 +24,7 @@ LIMIT_KEYS = tuple(key for key in LimitsConfig.model_fields if key != "source")
 """Keys of `limits` with one value for each joint."""
 MAX_ANGLE_DEG = 360.0
 """Maximum position of a joint [degree]; a joint that turns further is limited to it."""
-RANGES = {"velocity_deg": (5.0, 1000.0), "effort": (0.1, 1e5)}
+RANGES = {"velocity_deg": (1.0, 1000.0), "effort": (0.1, 1e5)}
 """Smallest and largest value of a joint that an arm file may contain [degree/s, Nm]; NaN is in no range."""
 
 
