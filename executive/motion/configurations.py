@@ -39,6 +39,9 @@ MIN_JOINT_DIFFERENCE = 0.2
 """Minimum difference between two candidates in the joint that differs most [rad]."""
 MAX_CURVATURE_FRACTION = 0.5
 """Maximum fraction of a joint's acceleration and jerk limits that the terms with q_ss and q_sss may use."""
+MAX_VELOCITY_FRACTION = 0.99
+"""Maximum fraction of a joint's velocity limit on a line: the free part before or after it accelerates there,
+and must not exceed the limit."""
 _CHECKED_FRACTIONS = np.linspace(0.0, 1.0, 33)  # fractions of the length at which joint limits are evaluated
 _MIN_DIVISOR = 1e-9  # [rad/m], [rad/m²], [rad/m³]: avoids a division by 0 for a joint that does not move
 
@@ -271,7 +274,7 @@ class CartesianLine:
         derivatives = [self._compute_derivatives(distances, order) for order in (1, 2, 3)]
         q_s, q_ss, q_sss = (np.abs(values).max(axis=0) for values in derivatives)
         max_speeds = (
-            limits.velocity / (q_s + _MIN_DIVISOR),
+            MAX_VELOCITY_FRACTION * limits.velocity / (q_s + _MIN_DIVISOR),
             # Speed that the tool reaches with its maximum acceleration on the whole line.
             math.sqrt(2 * length * np.min(limits.acceleration / (q_s + _MIN_DIVISOR))),
             np.sqrt(MAX_CURVATURE_FRACTION * limits.acceleration / (q_ss + _MIN_DIVISOR)),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from joint_states import passed, peaks
@@ -11,6 +13,7 @@ from executive.cell.arm import Goal, Task
 from executive.cell.arm_config import LimitsConfig
 from executive.cell.config import CellConfig
 from executive.cell.objects import ObjectClass, Obstacle
+from executive.mission.cell_file import load_cell
 from executive.motion.joints import JointLimits, Kinematics
 from executive.motion.planner import Planner
 
@@ -65,3 +68,12 @@ def test_motions_of_six_joints_reach_their_goals_within_asymmetric_limits(
         assert arm.compute_tool_pose(motion.end).rotation[2, 2] == pytest.approx(-1)
         q = motion.end
     assert all(path.shape[1] == 6 for path in checked)
+
+
+@pytest.mark.parametrize("y", [-0.2, 0.2])
+def test_an_arm_with_the_slowest_joints_finds_its_way(missions: Path, y: float) -> None:
+    config = load_cell(missions / "cells" / "ur5e.yaml")
+    limits = config.arm.limits.model_copy(update={"velocity_deg": (1.0,) * 6})
+    slow = config.model_copy(update={"arm": config.arm.model_copy(update={"limits": limits})})
+    goal = Goal((0.62, y, 0.05), guarded_length=0.01, guarded_speed=0.02)
+    assert Planner(slow).plan(np.radians(config.arm.poses_deg["home"]), goal).duration > 10
