@@ -288,8 +288,8 @@ def keep_stdout_clean() -> Iterator[None]:
 
 def print_json(value: Any) -> None:
     """Print `value` to stdout as one JSON object or array."""
-    # Another encoding than UTF-8 lacks most characters.
-    is_ascii_only = sys.stdout.encoding.lower() not in ("utf-8", "utf8")
+    # Another encoding than UTF-8 lacks most characters; a closed stream has no encoding.
+    is_ascii_only = (getattr(sys.stdout, "encoding", None) or "utf-8").lower() != "utf-8"
     click.echo(json.dumps(value, indent=2, ensure_ascii=is_ascii_only, allow_nan=False))
 
 
