@@ -25,10 +25,18 @@ class Yaw(NamedTuple):
     Attributes:
         angle: Rotation from the x axis of the frame towards its y axis [rad].
         std: Standard deviation of the angle [rad].
+        symmetry: Number of equal rotations per revolution after which the object looks the same; the angle is
+            known up to such a rotation.
     """
 
     angle: float
     std: float
+    symmetry: int = 1
+
+    def compute_difference(self, other: Yaw) -> float:
+        """Return the smallest rotation to another yaw [rad] that the symmetries of both permit."""
+        period = math.tau / max(self.symmetry, other.symmetry)
+        return math.remainder(other.angle - self.angle, period)
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,6 +5,7 @@ Each field is a key of `missions/cells/*.yaml`, in SI units. Values of keys that
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Annotated, Any, Literal
 
@@ -21,6 +22,7 @@ from pydantic import (
 
 from executive.cell.arm_config import ArmConfig
 from executive.cell.device_config import (
+    Angle,
     Angles,
     CameraConfig,
     ClockConfig,
@@ -41,6 +43,11 @@ from executive.cell.device_config import (
 from executive.cell.frame import ErrorRates
 from executive.cell.objects import Bin, ObjectClass
 from executive.cell.tools import ToolModel
+
+MAX_SQUARE_RATIO = 1.02
+"""Maximum ratio of the sides of a footprint that counts as square."""
+MAX_ROUND_RATIO = (1 + 2**0.5) / 2
+"""Maximum ratio of the diameter of an object to the side of its square footprint if it counts as round."""
 
 
 class ObjectConfig(Section):
@@ -77,6 +84,15 @@ class ObjectConfig(Section):
     sides of a detected box must fit it at some yaw, otherwise only the longer side must fit the radius. If
     the top is flat, the outline in the image must be that of a prism over the part of the rectangle within
     the radius."""
+    yaw_symmetry: int | None = Field(None, ge=0, le=12)
+    """Number of equal rotations per revolution about the vertical axis after which the object looks the same: 4
+    for a cube, 1 without symmetry, 0 for a round object, whose yaw is not measured. If not given, a rectangular
+    footprint has 2, because the two ends of a part often look alike; a square one has 4, or 0 if the radius is
+    nearer to that of the circle in the square than to that of the circle around it; no footprint has 0."""
+    yaw_offset_deg: Angle | None = None
+    """Angle from the x axis of the model to the feature of the outline whose direction an image shows [degree]: to
+    a corner; with a `yaw_symmetry` of 2 to the longer axis, and of 1 to the narrower end of the longer axis. If
+    not given, 45 with 4, 90 for a footprint with a larger width than length, otherwise 0."""
     ring: Distance = 0.0
     """Distance of the contact point from the centre [m]; above 0 only for parts with a hole."""
     colours: tuple[Colour, ...] = ((1.0, 1.0, 1.0),)
@@ -86,11 +102,23 @@ class ObjectConfig(Section):
         """Return the declared object class; if the section declares no mass, with the default mass."""
         object_class = ObjectClass(
             label, self.height, self.radius, self.ring, looks_like=self.looks_like,
-            footprint=self.footprint, flat_top=self.flat_top,
+            footprint=self.footprint, flat_top=self.flat_top, **self._derive_yaw_properties(),
         )  # fmt: skip
         if self.mass is None:
             return object_class
         return replace(object_class, mass=self.mass, mass_std=self.mass_std)
+
+    def _derive_yaw_properties(self) -> dict[str, Any]:
+        """Return symmetry and offset [rad] of the yaw, derived from the footprint if they are not given."""
+        length, width = self.footprint or (1.0, 1.0)
+        symmetry = self.yaw_symmetry
+        if symmetry is None:
+            is_square = max(length, width) <= MAX_SQUARE_RATIO * min(length, width)
+            is_round = is_square and 2 * self.radius < MAX_ROUND_RATIO * length
+            symmetry = 0 if is_round or not self.footprint else 4 if is_square else 2
+        default_offset = 45.0 if symmetry == 4 else 90.0 if width > length else 0.0
+        offset = default_offset if self.yaw_offset_deg is None else self.yaw_offset_deg
+        return {"yaw_symmetry": symmetry, "yaw_offset": math.radians(offset)}
 
     @model_validator(mode="after")
     def _check_model(self) -> ObjectConfig:
@@ -102,6 +130,8 @@ class ObjectConfig(Section):
             )
         if self.footprint and max(self.footprint) > 2 * self.radius:
             raise ValueError(f"has a footprint longer than its diameter, 2 x {self.radius:g} m")
+        if self.yaw_symmetry and not self.footprint:
+            raise ValueError("needs a footprint for its yaw_symmetry; an outline must fit it")
         return self
 
 

@@ -166,12 +166,14 @@ class Detection:
         confidence: Confidence, 0 to 1.
         box: Bounding box of the whole object in the image [pixel].
         second_confidence: Confidence of the second most probable class of the box, 0 to 1; 0 if unknown.
+        outline: Polygon around the object in the image, x and y of each vertex [pixel]; empty if unknown.
     """
 
     label: str
     confidence: float
     box: Box
     second_confidence: float = 0.0
+    outline: tuple[tuple[float, float], ...] = ()
 
     @property
     def centre(self) -> tuple[float, float]:

@@ -119,6 +119,11 @@ class ObjectClass:
         looks_like: Class whose label the detectors report for objects of this class; "": this class.
         footprint: Length and width of the rectangle around the outline, seen from above [m]; None: unknown.
         flat_top: True if every point of the top has the height of the class.
+        yaw_symmetry: Number of equal rotations per revolution after which the object, seen from above, looks the
+            same: 4 for a cube, 1 without symmetry, 0 for a round object, which has no yaw.
+        yaw_offset: Angle in the frame of the object [rad] of the feature of its outline whose direction an image
+            shows: of a corner, for a symmetry of 2 of the longer axis, and for a symmetry of 1 of the end of
+            the longer axis at which the outline is narrower.
         support_heights: Heights above the table of the surfaces on which an object of the class may lie [m].
     """
 
@@ -131,6 +136,8 @@ class ObjectClass:
     looks_like: str = ""
     footprint: tuple[float, float] | None = None
     flat_top: bool = False
+    yaw_symmetry: int = 0
+    yaw_offset: float = 0.0
     support_heights: tuple[float, ...] = (0.0,)
 
     @property

@@ -106,6 +106,7 @@ class ToolModel(Section):
         safety_factor: Ratio of the holding force to the largest force on the grip during a motion.
         min_lift_acceleration: Lower limit of the maximum acceleration of a lift, even if the tool holds with
             less force [m/s²].
+        needs_yaw: True if a grasp depends on the yaw of the object, so that images must show it.
     """
 
     noun: ClassVar[str] = "grip"
@@ -113,6 +114,7 @@ class ToolModel(Section):
     touch_distance: ClassVar[float] = 0.001
     safety_factor: ClassVar[float] = 2.0
     min_lift_acceleration: ClassVar[float] = 0.5
+    needs_yaw: ClassVar[bool] = False
 
     kind: str = DEFAULT_KIND
     """Kind of tool: the name of an entry point of the group `executive.tools`."""

@@ -14,6 +14,7 @@ from executive.errors import NoDepth
 from executive.geometry import Array
 from executive.perception import evidence
 from executive.perception.camera_model import compute_pixel_ray, intersect_plane, measure_top_height
+from executive.perception.yaw import measure_yaw
 
 OUTLINE_DISTANCE = 0.1
 """Minimum distance from bins at which the outline of an object is compared with its class [m]."""
@@ -38,12 +39,14 @@ class CellLocalizer:
         classes: Classes of the cell by label.
         bins: Bins of the cell; classes of objects in bins are not checked.
         cast_ray: Ray test of the simulator, for the method `ray`.
+        measures_yaw: True if the yaws of confident detections are measured.
     """
 
     method: Literal["plane", "depth", "ray"]
     classes: Mapping[str, ObjectClass]
     bins: Collection[Bin] = ()
     cast_ray: RayTest | None = None
+    measures_yaw: bool = False
 
     def locate(self, detection: Detection, frame: Frame) -> Array:
         """Return the centre; NoDepth: unknown height, or no intersection in front of the camera."""
@@ -74,9 +77,10 @@ class CellLocalizer:
         return [*others, *confident]
 
     def _observe(self, detections: Detections, detection: Detection) -> Observation:
-        """Return the observation of one detection: position, standard deviation and contradiction."""
+        """Return the observation of one detection: position, yaw, standard deviations and contradiction."""
         frame = detections.frame
         contradiction = ""
+        yaw = None
         position = self.locate(detection, frame)
         is_doubtful = detection in detections.doubtful
         std = detections.error_rates.jitter * frame.compute_depth(position) / float(frame.matrix[0, 0])
@@ -84,8 +88,10 @@ class CellLocalizer:
             std = max(std, UNKNOWN_POSITION_STD)
         elif not is_doubtful:
             contradiction = self._describe_contradiction(detections, detection, position)
+            if self.measures_yaw:
+                yaw = measure_yaw(detections, detection, position, self.classes[detection.label])
         is_confident = not (is_doubtful or contradiction)
-        return Observation(detection, position, std, frame.stamp, is_confident, contradiction)
+        return Observation(detection, position, std, frame.stamp, is_confident, contradiction, yaw)
 
     def _describe_contradiction(self, detections: Detections, detection: Detection, position: Array) -> str:
         """Return a text with evidence against the detected class; "" if there is none.

@@ -204,7 +204,9 @@ class Station:
                 is_hidden_by_arm=not is_without_physics,
             )
             method = "plane" if is_without_physics else config.localization
-            localizer = CellLocalizer(method, classes, tuple(bins.values()), cast_ray)
+            localizer = CellLocalizer(
+                method, classes, tuple(bins.values()), cast_ray, measures_yaw=config.tool.needs_yaw
+            )
             self.cell = Cell(
                 clock=clock,
                 arm=PlannedArm(recorded_arm, self.border.wrap("planner", planner), kinematics, poses),
