@@ -85,13 +85,13 @@ class ObjectConfig(Section):
     the top is flat, the outline in the image must be that of a prism over the part of the rectangle within
     the radius."""
     yaw_symmetry: int | None = Field(None, ge=0, le=12)
-    """Number of equal rotations per revolution about the vertical axis after which the object looks the same: 4
-    for a cube, 1 without symmetry, 0 for a round object, whose yaw is not measured. If not given, a rectangular
-    footprint has 2, because the two ends of a part often look alike; a square one has 4, or 0 if the radius is
-    nearer to that of the circle in the square than to that of the circle around it; no footprint has 0."""
+    """Number of equal rotations per revolution about the vertical axis after which the object looks the same:
+    4 for a cube, 1 without symmetry, 0 for a round object, whose yaw is not measured. If not given, 0 without
+    a footprint, 2 for a rectangular one, because the two ends of a part often look alike, and 4 for a square
+    one; but 0 if the radius is nearer to that of the circle in the square than to that around it."""
     yaw_offset_deg: Angle | None = None
-    """Angle from the x axis of the model to the feature of the outline whose direction an image shows [degree]: to
-    a corner; with a `yaw_symmetry` of 2 to the longer axis, and of 1 to the narrower end of the longer axis. If
+    """Angle from the x axis of the model to the part of the outline whose direction an image shows [degree]:
+    to a corner; with a `yaw_symmetry` of 2 to the longer axis, and of 1 to the narrower end of that axis. If
     not given, 45 with 4, 90 for a footprint with a larger width than length, otherwise 0."""
     ring: Distance = 0.0
     """Distance of the contact point from the centre [m]; above 0 only for parts with a hole."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -180,6 +180,12 @@ class Detection:
         """Centre x and y of the box [pixel]."""
         left, top, right, bottom = self.box
         return (left + right) / 2, (top + bottom) / 2
+
+    def shift(self, x: float, y: float) -> Detection:
+        """Return the detection with box and outline shifted by `x` and `y` [pixel]."""
+        left, top, right, bottom = self.box
+        box = (left + x, top + y, right + x, bottom + y)
+        return replace(self, box=box, outline=tuple((u + x, v + y) for u, v in self.outline))
 
 
 @dataclass(frozen=True, eq=False)

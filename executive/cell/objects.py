@@ -41,7 +41,7 @@ class Target:
         frame: Id of the last frame that showed the item.
         change_count: Number of robot actions that may have moved objects before the capture of that frame.
         stamp: Capture time of the last frame that showed the item [s].
-        yaw: Angle of the object at `stamp`; None if it is unknown.
+        yaw: Angle of the object in the world at `stamp`; None if it is unknown.
     """
 
     item: ItemName
@@ -119,11 +119,10 @@ class ObjectClass:
         looks_like: Class whose label the detectors report for objects of this class; "": this class.
         footprint: Length and width of the rectangle around the outline, seen from above [m]; None: unknown.
         flat_top: True if every point of the top has the height of the class.
-        yaw_symmetry: Number of equal rotations per revolution after which the object, seen from above, looks the
-            same: 4 for a cube, 1 without symmetry, 0 for a round object, which has no yaw.
-        yaw_offset: Angle in the frame of the object [rad] of the feature of its outline whose direction an image
-            shows: of a corner, for a symmetry of 2 of the longer axis, and for a symmetry of 1 of the end of
-            the longer axis at which the outline is narrower.
+        yaw_symmetry: Number of equal rotations per revolution after which the object, seen from above, looks
+            the same: 4 for a cube, 1 without symmetry, 0 for a round object, which has no yaw.
+        yaw_offset: Angle in the frame of the object [rad] of the part of its outline whose direction an image
+            shows: of a corner; for a symmetry of 2 of the longer axis, and of 1 of its narrower end.
         support_heights: Heights above the table of the surfaces on which an object of the class may lie [m].
     """
 

@@ -29,7 +29,7 @@ from executive.errors import InputError
 from executive.geometry import GRAVITY, Array, Pose
 from executive.motion.configurations import find_configuration_pairs
 from executive.motion.joints import build_planning_kinematics
-from executive.perception.camera_model import compute_calibration
+from executive.perception.camera_model import compute_calibration, project
 from executive.text.files import MAX_RECORD_SIZE, read_file
 from executive.text.validate import KeyPath
 
@@ -110,6 +110,7 @@ class FakeCamera:
         self._matrix, self._X_MC = compute_calibration(self._config)
         # T is the frame of the tool, F the frame of the flange.
         self._X_TF = Pose.of((0.0, 0.0, -config.tool.length))
+        self._shows_outlines = config.tool.needs_yaw
         self._world = world
         self._arm = arm
         self._clock = clock
@@ -128,12 +129,19 @@ class FakeCamera:
             X_WC = self._arm.tool_pose @ self._X_TF @ self._X_MC
         for fake_object in self._world.objects:
             x, y, depth = self._matrix @ X_WC.inverse().apply(fake_object.position)
-            if depth > 0 and fake_object is not self._world.held_object:
-                column = x / depth
-                row = y / depth
-                half_side = self._matrix[0, 0] / depth * self._world.classes[fake_object.label].radius
-                box = (column - half_side, row - half_side, column + half_side, row + half_side)
-                yield Detection(fake_object.label, 1.0, box)
+            if depth <= 0 or fake_object is self._world.held_object:
+                continue
+            object_class = self._world.classes[fake_object.label]
+            if self._shows_outlines and object_class.yaw_symmetry:
+                pixels = project(self._matrix, X_WC, self._world.compute_outline(fake_object))
+                box = (*pixels.min(axis=0).tolist(), *pixels.max(axis=0).tolist())
+                yield Detection(object_class.label, 1.0, box, outline=tuple(map(tuple, pixels.tolist())))
+                continue
+            column = x / depth
+            row = y / depth
+            half_side = self._matrix[0, 0] / depth * object_class.radius
+            box = (column - half_side, row - half_side, column + half_side, row + half_side)
+            yield Detection(object_class.label, 1.0, box)
 
 
 class FakeArm:

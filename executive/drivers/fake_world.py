@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from itertools import product
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from executive.cell.config import CellConfig
 from executive.cell.devices import TrueObject
 from executive.cell.objects import BIN_THICKNESS, Bin, ObjectClass
-from executive.geometry import Array, Pose
+from executive.geometry import Array, Pose, rotate_about_z
 
 MAX_GRIP_OFFSET = 0.012
 """Maximum horizontal distance between the tool and the contact points of an object for a grip [m]."""
 TOUCH_DISTANCE = 0.001
 """Maximum vertical distance between the tool and the top of an object for contact [m]."""
+YAW_SEED = 1
+"""Last number of the seed of the yaws; the other number is the seed of the classes and positions."""
+RECTANGLE = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+"""Corners of a rectangle, in half sides."""
 
 
 @dataclass(eq=False)
@@ -41,11 +47,14 @@ class FakeWorld:
     held_object: TrueObject | None = None
     is_commanded: bool = False
 
-    def put(self, label: str, x: float, y: float) -> TrueObject:
-        """Put a new object of a class on the table, with its centre at `x` and `y` [m], and return it."""
+    def put(self, label: str, x: float, y: float, yaw: float = 0.0) -> TrueObject:
+        """Put a new object of a class on the table, with its centre at `x` and `y` [m], and return it.
+
+        `yaw` is its rotation about the vertical axis [rad].
+        """
         position = np.array([x, y, self.classes[label].height / 2])
         body = 1 + max((each.body for each in (*self.objects, *self.removed_objects)), default=-1)
-        fake_object = TrueObject(label, Pose.of(position), body, [position.copy()])
+        fake_object = TrueObject(label, Pose(rotate_about_z(yaw), position), body, [position.copy()])
         self.objects.append(fake_object)
         return fake_object
 
@@ -89,6 +98,22 @@ class FakeWorld:
         places = product((0.0, wall_margin), self.bins)
         return next((bin for margin, bin in places if bin.contains(fake_object.position, margin)), None)
 
+    def compute_outline(self, fake_object: TrueObject) -> Array:
+        """Return the corners `(N, 3)` [m] of the outline of an object that has a yaw, at half its height.
+
+        The outline is a regular polygon or, for a symmetry of 1 or 2, the footprint.
+        """
+        object_class = self.classes[fake_object.label]
+        symmetry = object_class.yaw_symmetry
+        assert object_class.footprint is not None, "checked by ObjectConfig"
+        if symmetry > 2:
+            angles = np.linspace(0.0, math.tau, symmetry, endpoint=False)
+            corners = object_class.radius * np.column_stack([np.cos(angles), np.sin(angles), 0 * angles])
+        else:
+            length, width = sorted(object_class.footprint, reverse=True)
+            corners = np.array([(x * length / 2, y * width / 2, 0.0) for x, y in RECTANGLE])
+        return fake_object.X_WO.apply(corners @ rotate_about_z(object_class.yaw_offset).T)
+
     def find_touched_object(self, tip_position: Array) -> TrueObject | None:
         """Return the object that a tool at `tip_position` `(3,)` [m] touches from above, or None."""
         for fake_object in self.objects:
@@ -105,10 +130,12 @@ class FakeWorld:
 def put_random_objects(world: FakeWorld, config: CellConfig, seed: int) -> None:
     """Put objects of random classes on random grid points, as many as the cell file permits."""
     rng = np.random.default_rng(seed)
+    yaw_rng = np.random.default_rng([seed, YAW_SEED])
     count = int(rng.integers(*config.table.objects, endpoint=True))
     points = list_grid_points(config)
     for index in rng.permutation(len(points))[:count]:
-        world.put(str(rng.choice(list(config.objects))), *points[index])
+        x, y = points[index]
+        world.put(str(rng.choice(list(config.objects))), x, y, yaw_rng.uniform(0, math.tau))
 
 
 def list_grid_points(config: CellConfig) -> list[tuple[float, float]]:
@@ -121,10 +148,13 @@ def list_grid_points(config: CellConfig) -> list[tuple[float, float]]:
 
 def encode_object(fake_object: TrueObject) -> list[object]:
     """Return the arguments of `decode_object` after the number, for the log."""
-    return [fake_object.label, fake_object.is_dropped, fake_object.position, *fake_object.rest_positions]
+    positions = (fake_object.position, *fake_object.rest_positions)
+    return [fake_object.label, fake_object.is_dropped, fake_object.X_WO.quaternion, *positions]
 
 
-def decode_object(body: int, label: object, is_dropped: object, *positions: object) -> TrueObject:
+def decode_object(
+    body: int, label: object, is_dropped: object, quaternion: ArrayLike, *positions: object
+) -> TrueObject:
     """Return an object from the log: `positions` are the current position and the rest positions."""
     position, *rest_positions = np.array(positions, dtype=float).reshape(-1, 3)
-    return TrueObject(str(label), Pose.of(position), body, rest_positions, bool(is_dropped))
+    return TrueObject(str(label), Pose.of(position, quaternion), body, rest_positions, bool(is_dropped))

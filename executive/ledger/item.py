@@ -20,6 +20,8 @@ from executive.ledger.belief import Belief
 
 SAME_POSITION_TOLERANCE = 0.01
 """Maximum distance between two measurements of the same position [m]."""
+MAX_YAW_STDS = 4.0
+"""Maximum difference between a measured yaw and the mean of an unmoved item, in its standard deviations."""
 REASON_NOT_FOUND = "more looks missed it than saw it"
 """Reason of the state PHANTOM of an item whose position was empty in most looks."""
 REASON_UNCERTAIN = "it has no confident detection"
@@ -82,7 +84,8 @@ class ItemRecord:
         stamp: Capture time of the last image that showed the item, or of the last image before its placement
             [s].
         confidence: Confidence of the last detection, 0 to 1.
-        yaw: Angle of the object in the world at the last detection; None if it is unknown.
+        yaw: Mean of the angles measured since the last possible move of the item; None if it is unknown.
+        yaw_weight: Sum of the inverse variances of these angles [1/rad²].
         state: State of the item.
         bin: Name of the bin that contains the item, or "".
         reason: Reason of the state, or "".
@@ -122,6 +125,7 @@ class ItemRecord:
     stamp: float = 0.0
     confidence: float = 0.0
     yaw: Yaw | None = None
+    yaw_weight: float = 0.0
     state: State = State.SEEN
     bin: str = ""
     reason: str = ""
@@ -252,7 +256,28 @@ class ItemRecord:
         self.change_count = frame.change_count
         self.frame_id = frame.id
         self.stamp = observation.stamp
-        self.yaw = observation.yaw
+        self._update_yaw(observation.yaw, is_unmoved=is_unmoved)
+
+    def _update_yaw(self, yaw: Yaw | None, *, is_unmoved: bool) -> None:
+        """Set the yaw to a measurement or, if the item is unmoved, to the weighted mean of yaws.
+
+        A measurement that contradicts the mean replaces it. The mean is not more certain than the best look:
+        outlines in images from one place have nearly the same errors (correlation 0.99 in rendered images).
+        """
+        mean = self.yaw
+        if mean is not None and is_unmoved:
+            if yaw is None:
+                return
+            difference = mean.compute_difference(yaw)
+            if abs(difference) <= MAX_YAW_STDS * math.hypot(mean.std, yaw.std):
+                self.yaw_weight += yaw.std**-2
+                # The yaw with the lower symmetry tells which of the equal rotations is meant.
+                start = mean.angle if mean.symmetry <= yaw.symmetry else yaw.angle - difference
+                angle = start + difference * yaw.std**-2 / self.yaw_weight
+                self.yaw = Yaw(angle, min(mean.std, yaw.std), min(mean.symmetry, yaw.symmetry))
+                return
+        self.yaw = yaw
+        self.yaw_weight = yaw.std**-2 if yaw else 0.0
 
     def mark_as_detected_in_bin(self, frame: Frame) -> None:
         """Record that a frame shows the placed item in its bin."""
@@ -284,6 +309,7 @@ class ItemRecord:
         self.stamp = new_item.stamp
         self.confidence = new_item.confidence
         self.yaw = new_item.yaw
+        self.yaw_weight = new_item.yaw_weight
         if self.state is State.PHANTOM:
             self.belief.log_odds = new_item.belief.log_odds
             is_hopeless = self.rejection_count >= MAX_REJECTIONS

@@ -58,15 +58,17 @@ def decode_array(value: Any) -> Array:
 
 
 def encode_detection(detection: Detection) -> list[Any]:
-    """Return the class, its confidence, the box and the confidence of the second most likely class."""
+    """Return class, confidence, box, confidence of the second most likely class, and the outline if known."""
     box = [float(edge) for edge in detection.box]
-    return [detection.label, float(detection.confidence), box, float(detection.second_confidence)]
+    outline = [[[float(x), float(y)] for x, y in detection.outline]] if detection.outline else []
+    return [detection.label, float(detection.confidence), box, float(detection.second_confidence), *outline]
 
 
 def decode_detection(value: Any) -> Detection:
     """Return the detection that `encode_detection` encoded."""
-    label, confidence, box, second_confidence = value
-    return Detection(label, confidence, tuple(box), second_confidence)
+    label, confidence, box, second_confidence, *outlines = value
+    outline = tuple((x, y) for outline in outlines for x, y in outline)
+    return Detection(label, confidence, tuple(box), second_confidence, outline)
 
 
 def encode_answer(answer: Answer) -> dict[str, Any]:

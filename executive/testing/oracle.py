@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -151,10 +151,18 @@ class TruthCamera(SimCamera):
                 pixels = project(camera_matrix, X_WC, vertices)
                 outlines.append(_Outline(label, pixels, float(distances.mean())))
         return tuple(
-            Detection(outline.label, 1.0, compute_bounding_box(outline.pixels))
+            self._make_detection(outline)
             for outline in outlines
             if outline.label != UNKNOWN_LABEL and not any(other.is_occluding(outline) for other in outlines)
         )
+
+    def _make_detection(self, outline: _Outline) -> Detection:
+        """Return the true detection of an object; with its convex outline if the tool needs the yaw."""
+        detection = Detection(outline.label, 1.0, compute_bounding_box(outline.pixels))
+        if not self._world.config.tool.needs_yaw:
+            return detection
+        hull = cv2.convexHull(outline.pixels.astype(np.float32)).reshape(-1, 2)
+        return replace(detection, outline=tuple((x, y) for x, y in hull.tolist()))
 
 
 @dataclass(frozen=True)

@@ -242,7 +242,7 @@ def _call_at_once(search: Callable[[], Answer]) -> Future[Answer]:
 
 
 def _is_valid(detection: Detection, frame: Frame) -> bool:
-    """Return True if a detection has a valid confidence, a printable label, and a valid box in the image."""
+    """Return True if a detection has valid confidence, box and outline, and a printable label."""
     left, top, right, bottom = detection.box
     height, width = frame.visible.shape
     # These comparisons also reject NaN.
@@ -250,7 +250,8 @@ def _is_valid(detection: Detection, frame: Frame) -> bool:
     is_box = min(sides) >= 0 and MIN_BOX_SIDE <= max(sides) <= MAX_BOX_SIDE
     is_in_image = right >= 0 and bottom >= 0 and left <= width and top <= height
     is_printable = detection.label.isprintable() and len(detection.label) <= MAX_LABEL_LENGTH
-    return is_box and is_in_image and 0 <= detection.confidence <= 1 and is_printable
+    is_outline = bool(np.isfinite(detection.outline).all())
+    return is_box and is_in_image and is_outline and 0 <= detection.confidence <= 1 and is_printable
 
 
 TRUE_CONFIDENCE = 0.9

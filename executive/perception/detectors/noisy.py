@@ -81,8 +81,8 @@ class NoisyDetector:
         return replace(detection, label=label, confidence=self._draw_confidence(MAX_CONFUSED_CONFIDENCE, rng))
 
     def _shift_box(self, detection: Detection, rng: np.random.Generator) -> Detection:
-        shift = rng.normal(0.0, self._config.jitter, 2)
-        return replace(detection, box=tuple(np.add(detection.box, [*shift, *shift])))
+        x, y = rng.normal(0.0, self._config.jitter, 2).tolist()
+        return detection.shift(x, y)
 
     def _make_false_detection(self, view: str, rng: np.random.Generator) -> Detection:
         """Return a detection with random class, confidence and box in the region of a view."""

@@ -65,10 +65,8 @@ def search_regions(
     for region in regions:
         left, top, right, bottom = region
         for detection in detect(image[top:bottom, left:right]):
-            box_left, box_top, box_right, box_bottom = detection.box
-            box = (left + box_left, top + box_top, left + box_right, top + box_bottom)
             label = class_map.get(detection.label, detection.label)
-            detections.append((replace(detection, label=label, box=box), region))
+            detections.append((replace(detection.shift(left, top), label=label), region))
     if len(regions) > 1:
         # Another tile shows the whole object; a part of an object may look like another class.
         size = (image.shape[1], image.shape[0])

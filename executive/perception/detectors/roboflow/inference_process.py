@@ -25,6 +25,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 import executive
 from executive.cell.frame import Detection
 from executive.errors import Fault, Unavailable
+from executive.geometry import rotate_about_z
 from executive.processes import build_command
 
 KEY_VARIABLE = "ROBOFLOW_API_KEY"
@@ -279,6 +280,13 @@ class _Origin(_ImageSize):
     offset_y: FiniteFloat
 
 
+class _Point(BaseModel):
+    """Vertex of a polygon [pixel of the sent image, or of a crop]."""
+
+    x: FiniteFloat
+    y: FiniteFloat
+
+
 class _Prediction(BaseModel):
     """Centre and size of a box [pixel of the sent image, or of a crop], class and confidence."""
 
@@ -291,7 +299,10 @@ class _Prediction(BaseModel):
     confidence: Annotated[float, Field(ge=0, le=1)]
     label: str = Field(alias="class", min_length=1)
     angle: FiniteFloat | None = None
-    """Rotation of the sides of the box, which the block "Bounding Rectangle" of a workflow adds [degree]."""
+    """Rotation of the sides of the box from the x axis to the y axis of the image, which the block "Bounding
+    Rectangle" of a workflow adds [degree]."""
+    points: list[_Point] = []
+    """Polygon around the mask that a model for instance segmentation found."""
     parent_origin: _Origin | None = None
     """Origin of a crop in its parent image, which may be a crop itself."""
     root_parent_origin: _Origin | None = None
@@ -366,31 +377,34 @@ def read_output(output: Any, size: tuple[int, int], is_of_crop: bool = False) ->
 
 
 def _convert_predictions(predictions: list[_Prediction], size: tuple[int, int]) -> Iterator[Detection]:
-    """Yield the predictions as detections, with boxes clipped to the image."""
+    """Yield the predictions as detections, with boxes clipped to the image.
+
+    The outline of a detection is the polygon around its mask, or consists of the corners of a rotated box.
+    """
     for index, prediction in enumerate(predictions):
         if prediction.width * prediction.height < MIN_BOX_AREA:
             box_size = f"{prediction.width:g} x {prediction.height:g} pixels"
             raise ValueError(f"predictions[{index}] is a box of {box_size}, as if in fractions of the image")
         origin = prediction.origin or _Origin(offset_x=0.0, offset_y=0.0)
         centre = np.array([prediction.x + origin.offset_x, prediction.y + origin.offset_y])
-        angle = math.radians(prediction.angle or 0.0)
-        sine = abs(math.sin(angle))
-        cosine = abs(math.cos(angle))
-        width = prediction.width * cosine + prediction.height * sine
-        height = prediction.width * sine + prediction.height * cosine
-        half_size = np.array([width, height]) / 2
-        low = centre - half_size
-        high = centre + half_size
+        rotation = rotate_about_z(math.radians(prediction.angle or 0.0))[:2, :2]
+        half_size = np.array([prediction.width, prediction.height]) / 2
+        corners = centre + half_size * [(-1, -1), (1, -1), (1, 1), (-1, 1)] @ rotation.T
+        low = corners.min(axis=0)
+        high = corners.max(axis=0)
         is_centre_inside = ((centre >= 0) & (centre <= size)).all()
         overhang = max((-low / size).max(), (high / size - 1).max())
         if overhang > MAX_OVERHANG or not is_centre_inside:
-            corners = "({:.0f}, {:.0f}) to ({:.0f}, {:.0f})".format(*low, *high)
+            place = "({:.0f}, {:.0f}) to ({:.0f}, {:.0f})".format(*low, *high)
             image = f"an image of {size[0]} x {size[1]} pixels"
-            raise ValueError(f"predictions[{index}] is a box from {corners} in {image}")
+            raise ValueError(f"predictions[{index}] is a box from {place} in {image}")
         left, top = np.maximum(low, 0.0).tolist()
         right, bottom = np.minimum(high, size).tolist()
         box = (left, top, right, bottom)
-        yield Detection(prediction.label, prediction.confidence, box)
+        outline = [(point.x + origin.offset_x, point.y + origin.offset_y) for point in prediction.points]
+        if prediction.angle is not None and not outline:
+            outline = [(x, y) for x, y in corners.tolist()]
+        yield Detection(prediction.label, prediction.confidence, box, outline=tuple(outline))
 
 
 def _describe_first_error(error: ValidationError) -> str:
