@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from functools import partial
 
 import cv2
 import numpy as np
@@ -22,7 +23,7 @@ from executive.cell.frame import Detection, Detections, Frame
 from executive.cell.objects import ObjectClass
 from executive.geometry import Array, Yaw
 from executive.perception.camera_model import compute_heights
-from executive.perception.evidence import TOP_TOLERANCE, is_completely_visible
+from executive.perception.evidence import MIN_OUTLINE_STDS, TOP_TOLERANCE, is_completely_visible
 
 Vertices = NDArray[np.complex128]
 """Vertices x + iy `(N,)` of a polygon, counterclockwise and relative to its centroid [m]."""
@@ -35,7 +36,7 @@ SIDE_TOLERANCE = 0.1
 """Maximum distance between a side of an outline and the same side of the box, relative to its longer side."""
 AREA_RANGE = (0.4, 1.4)
 """Minimum and maximum area of an outline, as a fraction of the area of its class."""
-COLOUR_OUTLINE_STD = 0.2
+COLOUR_OUTLINE_STD = 0.25
 """Standard deviation of an outline by colour [pixel]; its errors are independent at distances of a pixel.
 
 With this value, 95 % of the yaws of cubes in rendered images were within two standard deviations
@@ -114,14 +115,7 @@ def _find_masks(
     """
     if middle - height / 2 <= TOP_TOLERANCE:
         crop = np.ascontiguousarray(frame.image[np.ix_(rows, columns)])
-        border = np.concatenate([crop[0], crop[-1], crop[:, 0], crop[:, -1]])
-        distances = np.linalg.norm(crop - np.median(border, axis=0), axis=2).clip(0, 255).astype(np.uint8)
-        yield np.asarray(cv2.threshold(distances, 0, 1, cv2.THRESH_OTSU)[1], np.uint8), COLOUR_OUTLINE_STD
-        labels = np.zeros(crop.shape[:2], np.uint8)
-        box = (CROP_MARGIN, CROP_MARGIN, len(columns) - 2 * CROP_MARGIN, len(rows) - 2 * CROP_MARGIN)
-        cv2.setRNGSeed(0)  # GrabCut draws random numbers.
-        cv2.grabCut(crop, labels, box, np.zeros((1, 65)), np.zeros((1, 65)), 3, cv2.GC_INIT_WITH_RECT)
-        yield (labels & cv2.GC_FGD).astype(np.uint8), COLOUR_OUTLINE_STD
+        yield from ((mask, COLOUR_OUTLINE_STD) for mask in _find_masks_by_colour(crop))
     if frame.depth is not None:
         heights = compute_heights(frame, frame.depth, columns, rows)
         # The means of known neighbours fill the gaps at edges.
@@ -129,6 +123,34 @@ def _find_masks(
         known_fractions = cv2.blur(np.isfinite(heights).astype(float), (3, 3))
         is_object = sums > (middle - height / 4) * known_fractions
         yield is_object.astype(np.uint8), DEPTH_OUTLINE_STD
+
+
+def _find_masks_by_colour(crop: NDArray[np.uint8]) -> Iterator[NDArray[np.uint8]]:
+    """Yield masks `(H, W)` of the object in a crop `(H, W, 3)` that contrast with the border of the crop.
+
+    The first one contains the pixels that differ from the border. GrabCut also finds objects of two colours.
+    """
+    border = np.concatenate([crop[0], crop[-1], crop[:, 0], crop[:, -1]])
+    background = np.median(border, axis=0)
+    min_distance = MIN_OUTLINE_STDS * float(np.median(np.linalg.norm(border - background, axis=1)))
+    distances = np.linalg.norm(crop - background, axis=2).clip(0, 255).astype(np.uint8)
+    for find_mask in (partial(_apply_threshold, distances), partial(_apply_grab_cut, crop)):
+        mask = find_mask()
+        if mask.any() and np.median(distances[mask > 0]) >= min_distance:
+            yield mask
+
+
+def _apply_threshold(distances: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    return np.asarray(cv2.threshold(distances, 0, 1, cv2.THRESH_OTSU)[1], np.uint8)
+
+
+def _apply_grab_cut(crop: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    labels = np.zeros(crop.shape[:2], np.uint8)
+    width, height = (max(1, side - 2 * CROP_MARGIN) for side in crop.shape[1::-1])
+    box = (CROP_MARGIN, CROP_MARGIN, width, height)
+    cv2.setRNGSeed(0)  # GrabCut draws random numbers.
+    cv2.grabCut(crop, labels, box, np.zeros((1, 65)), np.zeros((1, 65)), 3, cv2.GC_INIT_WITH_RECT)
+    return (labels & cv2.GC_FGD).astype(np.uint8)
 
 
 def _project_outline(outline: Array, frame: Frame, height: float) -> Vertices:

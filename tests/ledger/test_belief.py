@@ -141,6 +141,40 @@ def test_a_target_has_time_and_yaw_of_its_last_detection() -> None:
     assert np.array_equal(pose.position, HERE)
 
 
+def measure_yaws(*yaws: Yaw | None, unmoved: bool = True) -> ItemRecord:
+    item = record()
+    for yaw in yaws:
+        seen = Observation(Detection("cube", 0.9, (0, 0, 1, 1)), HERE, 0.001, 0.0, yaw=yaw)
+        item.store(seen, take_frame(0), 0.0, is_unmoved=unmoved)
+    return item
+
+
+@pytest.mark.parametrize(
+    ("yaws", "expected"),
+    [
+        ([Yaw(0.1, 0.02, 4), Yaw(0.16, 0.02, 4)], Yaw(0.13, 0.02, 4)),
+        ([Yaw(0.1, 0.02, 4), Yaw(0.1, 0.02, 4), Yaw(0.16, 0.02, 4)], Yaw(0.12, 0.02, 4)),
+        ([Yaw(0.1, 0.01, 4), Yaw(0.2, 0.03, 4)], Yaw(0.11, 0.01, 4)),
+        ([Yaw(0.77, 0.02, 4), Yaw(-0.77, 0.02, 4)], Yaw(math.pi / 4, 0.02, 4)),
+        ([Yaw(0.1, 0.02, 2), Yaw(0.1 + 0.04 + math.pi, 0.02, 1)], Yaw(0.1 + 0.02 + math.pi, 0.02, 1)),
+        ([Yaw(0.1, 0.02, 1), Yaw(0.1 + 0.04 - math.pi, 0.02, 2)], Yaw(0.12, 0.02, 1)),
+        ([Yaw(0.1, 0.02, 4), None], Yaw(0.1, 0.02, 4)),
+        ([Yaw(0.1, 0.02, 4), Yaw(0.25, 0.02, 4)], Yaw(0.25, 0.02, 4)),
+        ([None, Yaw(0.1, 0.02, 4)], Yaw(0.1, 0.02, 4)),
+    ],
+)
+def test_yaws_of_an_unmoved_item_are_averaged_unless_they_contradict(
+    yaws: list[Yaw | None], expected: Yaw
+) -> None:
+    assert measure_yaws(*yaws).yaw == pytest.approx(expected)
+
+
+def test_a_move_forgets_the_yaw() -> None:
+    old, new = Yaw(0.1, 0.02, 4), Yaw(0.12, 0.02, 4)
+    assert measure_yaws(old, new, unmoved=False).yaw == new
+    assert measure_yaws(old, None, unmoved=False).yaw is None
+
+
 STD = 0.05
 LIGHT = ObjectClass("cube", 0.05, 0.0354, mass=0.05, mass_std=0.0)
 HEAVY = ObjectClass("full_cube", 0.05, 0.0354, mass=0.20, mass_std=0.0, looks_like="cube")

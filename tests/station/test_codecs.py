@@ -62,9 +62,12 @@ def test_an_image_of_an_impossible_size_is_refused(size: list[int]) -> None:
         IMAGE.decode({"size": size, "stamp": 0.0, "visible": None})
 
 
+points = st.tuples(finite, finite)
 detections = st.builds(
-    Detection, st.text(max_size=5), finite, st.tuples(finite, finite, finite, finite), finite
-)
+    Detection,
+    st.text(max_size=5), finite, st.tuples(finite, finite, finite, finite), finite,
+    st.lists(points, max_size=4).map(tuple),
+)  # fmt: skip
 some = st.lists(detections, max_size=4).map(tuple)
 
 
@@ -75,8 +78,22 @@ def test_an_answer_comes_back(found: tuple, doubtful: tuple, unknown: tuple, mis
     assert back(ANSWER, answer) == answer
 
 
+def test_detections_and_yaws_of_old_journals_are_read() -> None:
+    detection = Detection("duck", 0.9, (1.0, 2.0, 3.0, 4.0), 0.1)
+    observation = Observation(detection, np.zeros(3), 0.1, 2.0, True, "", Yaw(0.3, 0.01))
+    (encoded,) = OBSERVATIONS.encode([observation])
+    assert encoded[0] == ["duck", 0.9, [1.0, 2.0, 3.0, 4.0], 0.1], "an unknown outline takes no space"
+    (read,) = OBSERVATIONS.decode([[*encoded[:-1], [0.3, 0.01]]])
+    assert (read.detection, read.yaw) == (detection, Yaw(0.3, 0.01))
+
+
 @few
-@given(detections, arrays(np.float64, 3, elements=finite), finite, st.none() | st.builds(Yaw, finite, finite))
+@given(
+    detections,
+    arrays(np.float64, 3, elements=finite),
+    finite,
+    st.none() | st.builds(Yaw, finite, finite, st.integers(1, 6)),
+)
 def test_observations_come_back(
     detection: Detection, position: np.ndarray, value: float, yaw: Yaw | None
 ) -> None:

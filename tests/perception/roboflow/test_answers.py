@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import cv2
+import numpy as np
 import pytest
 
 from executive.cell.frame import Detection
@@ -88,6 +90,16 @@ def test_the_output_of_a_workflow_is_read_in_every_form_also_of_crops(output):
 def test_an_oriented_box_becomes_the_box_around_it(angle, x, y):
     (found,) = read_answer(answer({**CUBE, "angle": angle}), (100, 80))
     assert found.box == pytest.approx((50 - x, 40 - y, 50 + x, 40 + y), abs=1e-2)
+    corners = cv2.boxPoints(((50.0, 40.0), (20.0, 10.0), float(angle)))
+    assert sorted(found.outline) == pytest.approx(np.array(sorted(corners.tolist())), abs=1e-4)
+
+
+def test_the_polygon_of_a_mask_is_the_outline_also_in_a_crop():
+    points = [{"x": 1, "y": 2.5}, {"x": 19, "y": 3}, {"x": 9, "y": 9}]
+    (found,) = read_output([{**IN_CROP, "points": points, "angle": 30}], (100, 80))
+    assert found.outline == ((41, 37.5), (59, 38), (49, 44))
+    with pytest.raises(ValueError, match=r"predictions\[0\].points\[1\].y: input should be a finite"):
+        read_answer(answer({**CUBE, "points": [points[0], {"x": 1, "y": float("nan")}]}), (100, 80))
 
 
 @pytest.mark.parametrize(
