@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,14 +10,16 @@ import numpy as np
 import pytest
 
 from executive.cell.config import CellConfig
-from executive.cell.devices import check_driver_options
+from executive.cell.devices import DriverOptions, check_driver_options
 from executive.cell.frame import Detections
+from executive.drivers.fake import FakeDriver
 from executive.errors import InputError
 from executive.mission.cell_file import load_cell
 from executive.station.check import load_checker
 from executive.station.station import AUDIT_KEYS
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
+from executive.tools.suction import Suction
 from skills.detect import Detect
 from skills.localize import Localize
 from skills.move_to_scan import MoveToScan
@@ -126,3 +129,34 @@ def test_what_falls_on_the_wall_of_a_bin_falls_into_the_bin(load: Load, beside: 
     cell.tool.lose_grip()
     assert bin.contains(cube.position)
     assert beside is not None or np.allclose(cube.position[:2], (x, edge - radius))
+
+
+@pytest.mark.parametrize("name", ["overhead", "fasteners"])
+def test_looks_show_the_yaws_of_the_objects_if_the_tool_needs_them(
+    load: Load, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    config = load(name, table__objects="[6, 6]")
+    monkeypatch.setattr(Suction, "needs_yaw", True)
+    fake = FakeCell(config, seed=3, routes=dict.fromkeys(config.objects, tuple(config.bins)))
+    detections: Detections = run_skill(Detect(), fake).outputs["detections"]
+    targets = run_skill(Localize(detections=detections), fake).outputs["targets"]
+    assert len(targets) == 6
+    for thing in fake.world.objects:
+        target = min(targets, key=lambda each: float(np.linalg.norm(each.position - thing.position)))
+        symmetry = config.build_classes()[thing.label].yaw_symmetry
+        assert (target.yaw is None) == (symmetry == 0)
+        if target.yaw is not None:
+            true_yaw = math.atan2(thing.X_WO.rotation[1, 0], thing.X_WO.rotation[0, 0])
+            assert target.yaw.symmetry == symmetry
+            assert math.remainder(target.yaw.angle - true_yaw, math.tau / symmetry) == pytest.approx(
+                0, abs=1e-6
+            )
+
+
+def test_the_log_of_the_world_keeps_the_yaws(load: Load, tmp_path: Path) -> None:
+    first, second = FakeDriver(load()), FakeDriver(load(), DriverOptions(seed=5))
+    first.log_to(tmp_path / "world")
+    second.rebuild(tmp_path / "world")
+    for each, restored in zip(first.world.objects, second.world.objects, strict=True):
+        assert np.allclose(each.X_WO.rotation, restored.X_WO.rotation)
+        assert not np.allclose(each.X_WO.rotation, np.eye(3))

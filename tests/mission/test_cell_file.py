@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
@@ -210,3 +211,25 @@ def test_models_outside_of_the_folder_are_not_opened(model: str, small_cell: str
     file = read_cell(Path("c.yaml"), {})
     assert file.config is None
     assert [finding.code for finding in file.findings] == ["outside"]
+
+
+@pytest.mark.parametrize(
+    ("sizes", "expected"),
+    [
+        ("radius: 0.0354", (0, 0.0)),
+        ("radius: 0.0354, footprint: [0.05, 0.05]", (4, 45.0)),
+        ("radius: 0.03, footprint: [0.05, 0.0505]", (0, 0.0)),
+        ("radius: 0.03, footprint: [0.05, 0.03]", (2, 0.0)),
+        ("radius: 0.03, footprint: [0.03, 0.05]", (2, 90.0)),
+        ("radius: 0.03, footprint: [0.05, 0.05], yaw_symmetry: 6", (6, 0.0)),
+        ("radius: 0.03, footprint: [0.05, 0.03], yaw_symmetry: 1, yaw_offset_deg: 182", (1, 182.0)),
+    ],
+)
+def test_symmetry_and_offset_of_the_yaw_follow_from_the_footprint(
+    sizes: str, expected: tuple[int, float], small_cell: str
+) -> None:
+    Path("c.yaml").write_text(small_cell.replace("radius: 0.036", sizes))
+    cube = load_cell(Path("c.yaml")).build_classes()["cube"]
+    assert (cube.yaw_symmetry, math.degrees(cube.yaw_offset)) == pytest.approx(expected)
+    wrong = small_cell.replace("radius: 0.036", "radius: 0.0354, yaw_symmetry: 2")
+    assert "needs a footprint for its yaw_symmetry" in complaint(wrong)

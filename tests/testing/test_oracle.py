@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
+from executive.cell.frame import Detections, assume_rates
 from executive.events import discard_event
 from executive.geometry import Pose
 from executive.mission.cell_file import load_cell
 from executive.station.station import CellOptions, SilentOperator
 from executive.testing.fake_cell import SHIPPED_ROUTES
 from executive.testing.oracle import make_oracle_kind
+from executive.tools.suction import Suction
 
 
 @pytest.fixture
@@ -77,3 +81,22 @@ def test_what_is_elsewhere_or_hidden_by_the_arm_or_another_object_is_not_found(b
     assert find_labels(cell) == labels[1:]
     world.remove_object(second)
     assert find_labels(cell) == [labels[0], *labels[2:]]
+
+
+@pytest.mark.parametrize("needs_yaw", [True, False])
+def test_outlines_show_the_yaws_if_the_tool_needs_them(build, monkeypatch, needs_yaw):
+    monkeypatch.setattr(Suction, "needs_yaw", needs_yaw)
+    cell, world = build()
+    frame, found = look(cell)
+    look_of_table = Detections(
+        "embedded", tuple(found), assume_rates(0.5, ""), frame=frame, view="table", area=(192, 100, 448, 356)
+    )
+    observations = cell.cell.localizer.localize(look_of_table)
+    for observation, body in zip(observations, world.labels, strict=True):
+        assert bool(observation.detection.outline) == needs_yaw
+        rotation = world.get_object_pose(body).rotation
+        if yaw := observation.yaw:
+            difference = yaw.angle - math.atan2(rotation[1, 0], rotation[0, 0])
+            assert abs(math.remainder(difference, math.tau / yaw.symmetry)) < 2 * yaw.std < 0.3
+    with_yaw = {each.detection.label for each in observations if each.yaw}
+    assert with_yaw == ({"cube", "duck"} if needs_yaw else set())
