@@ -92,7 +92,7 @@ class ObjectConfig(Section):
     yaw_offset_deg: Angle | None = None
     """Angle from the x axis of the model to the part of the outline whose direction an image shows [degree]:
     to a corner; with a `yaw_symmetry` of 2 to the longer axis, and of 1 to the narrower end of that axis. If
-    not given, 45 with 4, 90 for a footprint with a larger width than length, otherwise 0."""
+    not given, 45 with 4, 90 with 1 or 2 and a footprint of a larger width than length, otherwise 0."""
     ring: Distance = 0.0
     """Distance of the contact point from the centre [m]; above 0 only for parts with a hole."""
     colours: tuple[Colour, ...] = ((1.0, 1.0, 1.0),)
@@ -116,7 +116,7 @@ class ObjectConfig(Section):
             is_square = max(length, width) <= MAX_SQUARE_RATIO * min(length, width)
             is_round = is_square and 2 * self.radius < MAX_ROUND_RATIO * length
             symmetry = 0 if is_round or not self.footprint else 4 if is_square else 2
-        default_offset = 45.0 if symmetry == 4 else 90.0 if width > length else 0.0
+        default_offset = 45.0 if symmetry == 4 else 90.0 if width > length and symmetry in (1, 2) else 0.0
         offset = default_offset if self.yaw_offset_deg is None else self.yaw_offset_deg
         return {"yaw_symmetry": symmetry, "yaw_offset": math.radians(offset)}
 

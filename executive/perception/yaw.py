@@ -115,7 +115,8 @@ def _find_masks(
     """
     if middle - height / 2 <= TOP_TOLERANCE:
         crop = np.ascontiguousarray(frame.image[np.ix_(rows, columns)])
-        yield from ((mask, COLOUR_OUTLINE_STD) for mask in _find_masks_by_colour(crop))
+        for mask in _find_masks_by_colour(crop):
+            yield mask, COLOUR_OUTLINE_STD
     if frame.depth is not None:
         heights = compute_heights(frame, frame.depth, columns, rows)
         # The means of known neighbours fill the gaps at edges.
