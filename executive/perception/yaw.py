@@ -46,9 +46,15 @@ DEPTH_OUTLINE_STD = 1.0
 """Standard deviation of an outline in the depth image of a D435, which has gaps at edges [pixel]."""
 DETECTOR_OUTLINE_STD = 1.0
 """Assumed standard deviation of an outline from a detector [pixel]."""
-UNEVEN_OUTLINE_STD = 0.0075
-"""Standard deviation of the outline of an object with an uneven top, as a fraction of the height, because the
-outline depends on the direction of view; its errors are independent at distances of the height."""
+FLAT_OBLIQUE_FRACTION = 0.01
+"""Standard deviation of the outline of an object with a flat top because of an oblique view, as a fraction of
+the horizontal distance between top and base in the image; its errors are independent at the distance of the
+height.
+
+The value was fitted to rendered images of cubes with up to 23 degrees between view and vertical axis.
+"""
+UNEVEN_OBLIQUE_FRACTION = 0.07
+"""The same for an object with an uneven top, which is no prism, fitted to images of ducks."""
 MAX_PHASE_STD = 0.5
 """Maximum standard deviation of the angle of a moment [rad]; that of a round outline is larger."""
 MIN_SKEWNESS = 0.05
@@ -77,14 +83,17 @@ def measure_yaw(
     if not object_class.yaw_symmetry or not is_completely_visible(detection, frame, look.area):
         return None
     pixel_size = frame.compute_depth(position) / float(frame.matrix[0, 0])
+    ray = position - frame.X_WC.position
+    oblique_std = object_class.height * float(np.linalg.norm(ray[:2]) / abs(ray[2]))
+    oblique_std *= FLAT_OBLIQUE_FRACTION if object_class.flat_top else UNEVEN_OBLIQUE_FRACTION
     box_sides = np.array(detection.box)
     max_distance = SIDE_TOLERANCE_PX + SIDE_TOLERANCE * (box_sides[2:] - box_sides[:2]).max()
     for outline, std in _find_outlines(detection, frame, position, object_class):
         sides = np.concatenate([outline.min(axis=0), outline.max(axis=0)])
         area = cv2.contourArea(outline.astype(np.float32)) * pixel_size**2 / object_class.outline_area
         if AREA_RANGE[0] <= area <= AREA_RANGE[1] and np.abs(sides - box_sides).max() <= max_distance:
-            vertices = _project_outline(outline, frame, float(position[2]))
-            return _compute_yaw(vertices, std * pixel_size, pixel_size, object_class)
+            density = (std * pixel_size) ** 2 * pixel_size + oblique_std**2 * object_class.height
+            return _compute_yaw(_project_outline(outline, frame, float(position[2])), density, object_class)
     return None
 
 
@@ -166,14 +175,10 @@ def _project_outline(outline: Array, frame: Frame, height: float) -> Vertices:
     return np.asarray((vertices - centroid)[:: 1 if doubled_areas.sum() > 0 else -1])
 
 
-def _compute_yaw(vertices: Vertices, std: float, pixel_size: float, object_class: ObjectClass) -> Yaw | None:
+def _compute_yaw(vertices: Vertices, density: float, object_class: ObjectClass) -> Yaw | None:
     """Return the yaw of an object from its outline; None if the outline is nearly round.
 
-    Args:
-        vertices: The outline.
-        std: Standard deviation of the outline [m], with errors that are independent at distances of a pixel.
-        pixel_size: Side of a pixel [m].
-        object_class: Class of the object.
+    `density` is the variance of the outline times the distance at which its errors are independent [m³].
     """
     symmetry = object_class.yaw_symmetry
     order = max(2, symmetry)
@@ -186,9 +191,6 @@ def _compute_yaw(vertices: Vertices, std: float, pixel_size: float, object_class
     ends = np.abs(vertices) ** (2 * order) + np.abs(following) ** (2 * order)
     middles = np.abs((vertices + following) / 2) ** (2 * order)
     squares = np.abs(following - vertices) * (ends + 4 * middles) / 6  # Simpson's rule along each edge
-    density = std**2 * pixel_size
-    if not object_class.flat_top:
-        density += UNEVEN_OUTLINE_STD**2 * object_class.height**3
     phase_std = math.sqrt(density * squares.sum() / 2) / float(abs(moment))
     if phase_std > MAX_PHASE_STD:
         return None

@@ -30,7 +30,7 @@ BOX_STD = 0.6
 MAX_BOX_ERROR = 4.0
 """Maximum difference between the sides of a detected box and those of the true box of its object [pixel]."""
 LIMITS = {"cube": (0.5, 2.0), "duck": (3.0, 6.0)}
-"""Limits of the median and of the 95th percentile of the error on the table, by class [degree]."""
+"""Limits of the median and of the 95th percentile of the error in the cell `overhead`, by class [degree]."""
 
 TrueBoxes = Sequence[tuple[TrueObject, Detection]]
 """Objects of a scene with their true boxes."""
@@ -67,7 +67,7 @@ def measure(cell: CellConfig, images: int = 140, seed: int = 0, true_boxes: bool
             for label, comparison in compare(look, objects, localizer):
                 if label in comparisons:
                     comparisons[label].append(comparison)
-    limits = {} if cell.table.stacked else LIMITS
+    limits = LIMITS if cell.cell == "overhead" else {}
     rows = [
         describe_class(label, each, limits.get(label, (math.inf, math.inf)))
         for label, each in comparisons.items()
