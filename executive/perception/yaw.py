@@ -191,8 +191,8 @@ def _compute_yaw(vertices: Vertices, density: float, object_class: ObjectClass) 
     ends = np.abs(vertices) ** (2 * order) + np.abs(following) ** (2 * order)
     middles = np.abs((vertices + following) / 2) ** (2 * order)
     squares = np.abs(following - vertices) * (ends + 4 * middles) / 6  # Simpson's rule along each edge
-    phase_std = math.sqrt(density * squares.sum() / 2) / float(abs(moment))
-    if phase_std > MAX_PHASE_STD:
+    moment_std = math.sqrt(density * squares.sum() / 2)
+    if moment_std > MAX_PHASE_STD * abs(moment):
         return None
     axis = np.angle(moment) / order
     if symmetry == 1:
@@ -200,7 +200,7 @@ def _compute_yaw(vertices: Vertices, density: float, object_class: ObjectClass) 
         axis += math.pi * (skewness < 0)
         symmetry = 1 if abs(skewness) >= MIN_SKEWNESS else 2
     angle = math.remainder(float(axis) - object_class.yaw_offset, math.tau / symmetry)
-    return Yaw(angle, phase_std / order, symmetry)
+    return Yaw(angle, moment_std / float(abs(moment)) / order, symmetry)
 
 
 def _compute_skewness(vertices: Vertices) -> float:

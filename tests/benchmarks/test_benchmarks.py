@@ -31,6 +31,7 @@ from tests.benchmarks import (
     suction_map,
     tick,
     wrong_sources,
+    yaw,
 )
 from tests.benchmarks.detector_variants import list_variants
 from tests.benchmarks.forks import ForkRunner
@@ -127,6 +128,12 @@ def test_solutions_of_an_arm_are_compared_with_an_exhaustive_search() -> None:
     assert (figures["problems"], figures["reachable"], figures["found_share"]) == ([], 2, 1)
     expected = np.array([[1.0] * 6, [2.0] * 6])
     assert kinematics.count_found(expected, expected[1:] + 2 * np.pi) == 1
+
+
+def test_yaws_in_rendered_images_are_measured() -> None:
+    figures = yaw.measure(load_cell(find_cell("overhead")), images=4, seed=1, true_boxes=True)
+    assert figures["problems"] == []
+    assert {row["class"]: row["within 4 std %"] for row in figures["classes"]} == {"cube": 100, "duck": 100}
 
 
 def test_the_shipped_map_is_what_the_code_measures() -> None:
