@@ -192,7 +192,7 @@ def _compute_yaw(vertices: Vertices, density: float, object_class: ObjectClass) 
     middles = np.abs((vertices + following) / 2) ** (2 * order)
     squares = np.abs(following - vertices) * (ends + 4 * middles) / 6  # Simpson's rule along each edge
     moment_std = math.sqrt(density * squares.sum() / 2)
-    if moment_std > MAX_PHASE_STD * abs(moment):
+    if moment_std >= MAX_PHASE_STD * abs(moment):
         return None
     axis = np.angle(moment) / order
     if symmetry == 1:
