@@ -34,8 +34,10 @@ SIDE_TOLERANCE_PX = 2.0
 """Maximum additional distance between a side of an outline and the same side of the box [pixel]."""
 SIDE_TOLERANCE = 0.1
 """Maximum distance between a side of an outline and the same side of the box, relative to its longer side."""
-AREA_RANGE = (0.4, 1.4)
-"""Minimum and maximum area of an outline, as a fraction of the area of its class."""
+MIN_AREA_FRACTION = 0.4
+"""Minimum area of an outline, as a fraction of that of its class."""
+MAX_AREA_FACTOR = 1.3
+"""Maximum area of an outline, as a multiple of the largest area of a prism over the outline of its class."""
 COLOUR_OUTLINE_STD = 0.25
 """Standard deviation of an outline by colour [pixel]; its errors are independent at distances of a pixel.
 
@@ -84,15 +86,18 @@ def measure_yaw(
         return None
     pixel_size = frame.compute_depth(position) / float(frame.matrix[0, 0])
     ray = position - frame.X_WC.position
-    oblique_std = object_class.height * float(np.linalg.norm(ray[:2]) / abs(ray[2]))
-    oblique_std *= FLAT_OBLIQUE_FRACTION if object_class.flat_top else UNEVEN_OBLIQUE_FRACTION
+    top_shift = object_class.height * float(np.linalg.norm(ray[:2]) / abs(ray[2]))
+    max_area = object_class.outline_area + 2 * object_class.radius * top_shift
+    oblique_fraction = FLAT_OBLIQUE_FRACTION if object_class.flat_top else UNEVEN_OBLIQUE_FRACTION
     box_sides = np.array(detection.box)
     max_distance = SIDE_TOLERANCE_PX + SIDE_TOLERANCE * (box_sides[2:] - box_sides[:2]).max()
     for outline, std in _find_outlines(detection, frame, position, object_class):
         sides = np.concatenate([outline.min(axis=0), outline.max(axis=0)])
-        area = cv2.contourArea(outline.astype(np.float32)) * pixel_size**2 / object_class.outline_area
-        if AREA_RANGE[0] <= area <= AREA_RANGE[1] and np.abs(sides - box_sides).max() <= max_distance:
-            density = (std * pixel_size) ** 2 * pixel_size + oblique_std**2 * object_class.height
+        area = cv2.contourArea(outline.astype(np.float32)) * pixel_size**2
+        has_area = MIN_AREA_FRACTION * object_class.outline_area <= area <= MAX_AREA_FACTOR * max_area
+        if has_area and np.abs(sides - box_sides).max() <= max_distance:
+            density = (std * pixel_size) ** 2 * pixel_size
+            density += (oblique_fraction * top_shift) ** 2 * object_class.height
             return _compute_yaw(_project_outline(outline, frame, float(position[2])), density, object_class)
     return None
 
