@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -166,14 +166,15 @@ class Detection:
         confidence: Confidence, 0 to 1.
         box: Bounding box of the whole object in the image [pixel].
         second_confidence: Confidence of the second most probable class of the box, 0 to 1; 0 if unknown.
-        outline: Polygon around the object in the image, x and y of each vertex [pixel]; empty if unknown.
+        outline: Polygon around the object in the image, x and y of each vertex [pixel]; None if unknown.
     """
 
     label: str
     confidence: float
     box: Box
     second_confidence: float = 0.0
-    outline: tuple[tuple[float, float], ...] = ()
+    outline: tuple[tuple[float, float], ...] | None = None
+    omits_none: ClassVar[bool] = True
 
     @property
     def centre(self) -> tuple[float, float]:
@@ -185,7 +186,8 @@ class Detection:
         """Return the detection with box and outline shifted by `x` and `y` [pixel]."""
         left, top, right, bottom = self.box
         box = (left + x, top + y, right + x, bottom + y)
-        return replace(self, box=box, outline=tuple((u + x, v + y) for u, v in self.outline))
+        outline = self.outline and tuple((u + x, v + y) for u, v in self.outline)
+        return replace(self, box=box, outline=outline)
 
 
 @dataclass(frozen=True, eq=False)

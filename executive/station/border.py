@@ -67,7 +67,7 @@ def encode_detection(detection: Detection) -> list[Any]:
 def decode_detection(value: Any) -> Detection:
     """Return the detection that `encode_detection` encoded."""
     label, confidence, box, second_confidence, *outlines = value
-    outline = tuple((x, y) for outline in outlines for x, y in outline)
+    outline = tuple((x, y) for x, y in outlines[0]) if outlines else None
     return Detection(label, confidence, tuple(box), second_confidence, outline)
 
 
@@ -197,6 +197,7 @@ ATTRIBUTES: Mapping[str, Input] = {
     "tool.holding_force": Input("tool.holding_force"),
     "tool.load": Input("tool.load"),
     "tool.load_std": Input("tool.load_std"),
+    "tool.opening": Input("tool.opening"),
     "request.ready": Input("detector.{name}.ready"),
 }
 """Inputs that are attributes, by role and attribute."""

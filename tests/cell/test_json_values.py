@@ -31,7 +31,7 @@ FRAME = Frame(
     np.ones((4, 4), bool), 0,
 )  # fmt: skip
 
-DUCK = {"label": "duck", "confidence": 0.6, "box": [1, 2.5, 3.0, 4], "second_confidence": 0.0, "outline": []}
+DUCK = {"label": "duck", "confidence": 0.6, "box": [1, 2.5, 3.0, 4], "second_confidence": 0.0}
 
 
 @pytest.mark.parametrize(

@@ -66,7 +66,7 @@ points = st.tuples(finite, finite)
 detections = st.builds(
     Detection,
     st.text(max_size=5), finite, st.tuples(finite, finite, finite, finite), finite,
-    st.lists(points, max_size=4).map(tuple),
+    st.none() | st.lists(points, min_size=1, max_size=4).map(tuple),
 )  # fmt: skip
 some = st.lists(detections, max_size=4).map(tuple)
 

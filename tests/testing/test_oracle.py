@@ -93,7 +93,7 @@ def test_outlines_show_the_yaws_if_the_tool_needs_them(build, monkeypatch, needs
     )
     observations = cell.cell.localizer.localize(look_of_table)
     for observation, body in zip(observations, world.labels, strict=True):
-        assert bool(observation.detection.outline) == needs_yaw
+        assert (observation.detection.outline is not None) == needs_yaw
         rotation = world.get_object_pose(body).rotation
         if yaw := observation.yaw:
             difference = yaw.angle - math.atan2(rotation[1, 0], rotation[0, 0])

@@ -250,7 +250,7 @@ def _is_valid(detection: Detection, frame: Frame) -> bool:
     is_box = min(sides) >= 0 and MIN_BOX_SIDE <= max(sides) <= MAX_BOX_SIDE
     is_in_image = right >= 0 and bottom >= 0 and left <= width and top <= height
     is_printable = detection.label.isprintable() and len(detection.label) <= MAX_LABEL_LENGTH
-    is_outline = bool(np.isfinite(detection.outline).all())
+    is_outline = bool(np.isfinite(detection.outline or ()).all())
     return is_box and is_in_image and is_outline and 0 <= detection.confidence <= 1 and is_printable
 
 

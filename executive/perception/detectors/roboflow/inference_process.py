@@ -404,7 +404,7 @@ def _convert_predictions(predictions: list[_Prediction], size: tuple[int, int]) 
         outline = [(point.x + origin.offset_x, point.y + origin.offset_y) for point in prediction.points]
         if prediction.angle is not None and not outline:
             outline = [(x, y) for x, y in corners.tolist()]
-        yield Detection(prediction.label, prediction.confidence, box, outline=tuple(outline))
+        yield Detection(prediction.label, prediction.confidence, box, outline=tuple(outline) or None)
 
 
 def _describe_first_error(error: ValidationError) -> str:
