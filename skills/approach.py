@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from functools import partial
 
-from executive.cell.arm import Goal, MotionGuard, Task
+from executive.cell.arm import Goal, Motion, MotionGuard, Task
 from executive.cell.objects import Target
 from executive.cell.protocols import Cell, Steps
-from executive.cell.tools import CONTACT_SPACING, OVERTRAVEL
+from executive.cell.tools import CONTACT_SPACING, OVERTRAVEL, GraspPose
+from executive.manipulation.grasps import choose_grasp
 from executive.manipulation.motions import follow, plan
-from executive.manipulation.tool_goals import choose_grasp, find_max_object_height
+from executive.manipulation.tool_goals import find_max_object_height
 from executive.skill import EMPTY, In, Metres, Skill, param, port
 
 EARLY_CONTACT_MARGIN = 0.001
@@ -26,6 +28,10 @@ class Approach(Skill):
     tool that grips the top of an object succeeds on contact near the expected height: repeated attempts touch
     different points, on a spiral or on the ring of an object with a hole, and from the fourth attempt on, the
     descent ends 5 mm above the table, to distinguish a false detection from an object.
+
+    A gripper opens its fingers to the width of the object, moves them down on both sides of the object, and
+    succeeds without a contact. It takes the fastest yaw at which its fingers hit neither neighbours nor
+    walls; if there is none, the skill fails with `blocked` and names the neighbour.
 
     The tool may measure the object at the contact, for instance its height. A measurement may contradict the
     class of the target, unless an earlier measurement agreed with the class; the skill then fails with
@@ -65,9 +71,13 @@ class Approach(Skill):
         # The zero of a load cell drifts; only before the descent, the tool is at rest and certainly empty.
         cell.ledger.record_empty_load(tool.load)
         first_touch_height = 0.0
+        opening_time = self._find_opening_time(cell, grasp, motion)
 
         def record_first_touch() -> bool:
-            nonlocal first_touch_height
+            nonlocal first_touch_height, opening_time
+            if cell.clock.now >= opening_time:
+                tool.open(grasp.opening)
+                opening_time = math.inf
             # The border records each read of the tool pose, so the pose is read only once per contact.
             if not tool.touching:
                 first_touch_height = 0.0
@@ -113,3 +123,13 @@ class Approach(Skill):
             message = f"the top of {item} {expectation}; {measurement.contradiction}"
             raise self.failure("no_contact", message)
         yield  # The control step of the contact already has a high computational load.
+
+    def _find_opening_time(self, cell: Cell, grasp: GraspPose, motion: Motion) -> float:
+        """Return the time [s] at which the fingers open for the grasp; infinite for a tool without fingers.
+
+        Fingers in a bin open in the middle of the motion, because they have no space there.
+        """
+        if not grasp.opening:
+            return math.inf
+        is_in_bin = any(bin.contains(cell.arm.tool_pose.position) for bin in cell.bins.values())
+        return cell.clock.now + (motion.duration / 2 if is_in_bin else 0.0)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from executive.cell.objects import Item, Target
 from executive.cell.protocols import Cell, Steps
+from executive.cell.tools import ToolMeasurement
+from executive.manipulation.motions import wait_for_fingers
 from executive.skill import EMPTY, HOLDING, In, Out, Seconds, Skill, param, port
 
 MAX_FALSE_GRASPS = 3
@@ -14,7 +16,8 @@ class Grasp(Skill):
     """Close the tool on the target and verify the grasp.
 
     The skill succeeds if the tool's sensor reports an object after the settling time `settle`. It fails with
-    `sensor_implausible` if this sensor cannot be right.
+    `sensor_implausible` if this sensor cannot be right. It also waits until fingers are at rest; if their
+    distance contradicts the class of the target, the skill opens them and fails with `missed`.
     """
 
     target: In[Target] = port(doc="the target that the tool touches")
@@ -35,17 +38,28 @@ class Grasp(Skill):
             message = f"load or looks contradicted the sensor of the {noun} {count} times in a row"
             raise self.failure("sensor_implausible", f"{message}; check this sensor and the load cell")
         cell.tool.close()
+        is_gripping = False
         is_holding = False
+        measurement = ToolMeasurement()
         try:
             yield from cell.clock.sleep(self.settle)
-            is_holding = cell.tool.holding
+            yield from wait_for_fingers(cell)
+            is_gripping = cell.tool.holding
+            is_holding = is_gripping
+            if cell.tool_model.max_opening:
+                measurement = cell.tool_model.measure_grip(cell.classes[self.target.label], cell.tool.opening)
+                is_holding = is_gripping and not measurement.is_miss
+            if is_holding and cell.tool_model.max_opening:
+                is_holding = cell.ledger.record_measurement(self.target.item, measurement)
         finally:
             # A halted skill must not leave an object in the tool, because the ledger has recorded no grasp.
             if not is_holding:
                 cell.tool.open()
         if not is_holding:
-            cell.ledger.record_failed_pick(self.target.item)
+            cell.ledger.record_failed_pick(self.target.item, found_table=measurement.is_miss)
             message = f"no {noun} on {self.target.item} {self.settle:.2f} s after contact"
+            if is_gripping and measurement.contradiction:
+                message = f"{self.target.item} may be no {self.target.label}: {measurement.contradiction}"
             if not cell.ledger.is_tool_plausible:
                 message = f"{message}, and no pick has succeeded; check the tool and its sensor"
                 raise self.failure("sensor_implausible", message)

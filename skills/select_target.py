@@ -6,6 +6,7 @@ import math
 
 from executive.cell.objects import Item, Target
 from executive.cell.protocols import Cell
+from executive.manipulation.grasps import has_free_grasp
 from executive.manipulation.tool_goals import choose_bin, sort_by_tour, sort_pickable_targets
 from executive.perception.evidence import describe_unknown_labels
 from executive.skill import In, Out, Skill, SkillFailed, param, port
@@ -73,8 +74,10 @@ class SelectTarget(Skill):
         """Return the sort key of a candidate; the smallest key comes first."""
         known = cell.ledger.describe(target.item)
         if self.prefer == "surest":
-            return known.deferral_rank, -target.confidence, target.item
-        return known.deferral_rank, known.attempts if self.prefer == "least_tried" else 0
+            is_blocked = not has_free_grasp(cell, target)
+            return known.deferral_rank, is_blocked, -target.confidence, target.item
+        attempts = known.attempts if self.prefer == "least_tried" else 0
+        return known.deferral_rank, not has_free_grasp(cell, target), attempts
 
     def _is_permitted(self, cell: Cell, item: Item) -> bool:
         """Return True if a bin for an item is free, and `same`, `among` and `not` permit the item."""

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from executive.cell.objects import Item
 from executive.cell.protocols import Cell, Steps
+from executive.manipulation.grasps import make_bin_goal
 from executive.manipulation.motions import transport, verify_grasp
-from executive.manipulation.tool_goals import DROP_HEIGHT, explain_uncertain_bin, make_bin_goal
+from executive.manipulation.tool_goals import DROP_HEIGHT, explain_uncertain_bin
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Skill, param, port
 
 

@@ -43,6 +43,8 @@ MAX_LINK_COUNT = 80
 """Maximum number of links of an arm, up to the flange: the check of each pair of links takes time."""
 MAX_NAME_LENGTH = 200
 """Maximum length of the name of a link or joint [characters]; PyBullet crashes for much longer names."""
+ATTACHED = "tool_"
+"""Prefix of the names of links and joints of a model that hangs on the link of the tool."""
 MAX_DEPTH = 50
 """Maximum number of elements around an element of a URDF; very deep elements exhaust the stack."""
 _UNDECLARED_PREFIX = re.compile(r"(?<=[<\s/])(?!xmlns:)[A-Za-z_][\w.-]*:(?=[A-Za-z_][\w.-]*[\s=>/])")
@@ -187,6 +189,30 @@ class JointChain:
     def reach(self) -> float:
         """Sum of the distances between joints, from the second joint to the flange [m]."""
         return float(sum(np.linalg.norm(X.position) for X in (*self.offsets[2:], self.X_nF)))
+
+
+def read_couplings(urdf: str, joint: str) -> Mapping[str, float]:
+    """Return the ratio of the position of each coupled joint of a tool to that of `joint`, which is first.
+
+    The names are those of the model attached to an arm, with the prefix `ATTACHED`.
+
+    Raises:
+        InputError: The model has no such joint.
+    """
+    path = find_model(urdf)
+    joints = read_robot(path).findall("joint")
+    names = [element.get("name", "") for element in joints]
+    if joint not in names:
+        raise InputError(
+            f'the model {path.name} has no joint "{joint}"; {suggest_choice(joint, names, "Joints")}'
+        )
+    couplings = {ATTACHED + joint: 1.0}
+    for element in joints:
+        mimic = element.find("mimic")
+        if mimic is not None and mimic.get("joint") == joint:
+            (factor,) = parse_numbers(path, mimic, "multiplier", (1.0,))
+            couplings[ATTACHED + element.get("name", "")] = factor
+    return couplings
 
 
 def locate_flange(flange: FlangeConfig) -> Pose:

@@ -89,12 +89,14 @@ class Task:
         holding_force: Maximum force with which the tool holds the load [N].
         obstacles: Obstacles that are not in the cell file: objects on the table and in the bins.
         target: Obstacle that the tool may touch during the guarded descent, or None.
+        opening: Distance between the fingers of the tool during the motion [m].
     """
 
     load: ObjectClass | None = None
     holding_force: float = math.inf
     obstacles: tuple[Obstacle, ...] = ()
     target: Obstacle | None = None
+    opening: float = 0.0
 
 
 class Planning(Protocol):

@@ -95,6 +95,14 @@ class ObjectConfig(Section):
     not given, 45 with 4, 90 with 1 or 2 and a footprint of a larger width than length, otherwise 0."""
     ring: Distance = 0.0
     """Distance of the contact point from the centre [m]; above 0 only for parts with a hole."""
+    friction: float = Field(0.5, ge=0.01, le=5)
+    """Coefficient of friction of the surface, for tools that hold by friction; its product with that of the
+    pads counts. A simulation uses the value in the URDF, by default 0.5."""
+    grip_height: Distance = 0.0
+    """Height above the underside at which fingers hold the object [m]; 0: the middle."""
+    grip_widths: tuple[Length, Length] | None = None
+    """Smallest and largest distance between fingers that hold the object [m]; by default that of the sides of
+    `footprint`, or the diameter of a round object."""
     colours: tuple[Colour, ...] = ((1.0, 1.0, 1.0),)
     """Colours (red, green, blue, each 0 to 1) from which the colour of each spawned object is drawn."""
 
@@ -102,7 +110,8 @@ class ObjectConfig(Section):
         """Return the declared object class; if the section declares no mass, with the default mass."""
         object_class = ObjectClass(
             label, self.height, self.radius, self.ring, looks_like=self.looks_like,
-            footprint=self.footprint, flat_top=self.flat_top, **self._derive_yaw_properties(),
+            footprint=self.footprint, flat_top=self.flat_top, friction=self.friction,
+            grip_height=self.grip_height, grip_widths=self.grip_widths, **self._derive_yaw_properties(),
         )  # fmt: skip
         if self.mass is None:
             return object_class

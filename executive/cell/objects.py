@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated, ClassVar, TypeAlias
 
 import numpy as np
@@ -124,6 +125,10 @@ class ObjectClass:
         yaw_offset: Angle in the frame of the object [rad] of the part of its outline whose direction an image
             shows: of a corner; for a symmetry of 2 of the longer axis, and of 1 of its narrower end.
         support_heights: Heights above the table of the surfaces on which an object of the class may lie [m].
+        friction: Coefficient of friction of the surface.
+        grip_height: Height above the underside at which fingers hold the object [m]; 0: the middle.
+        grip_widths: Smallest and largest distance between the fingers that hold the object [m]; None: that
+            of the sides of `footprint`, or the diameter of a round object.
     """
 
     label: str
@@ -138,6 +143,9 @@ class ObjectClass:
     yaw_symmetry: int = 0
     yaw_offset: float = 0.0
     support_heights: tuple[float, ...] = (0.0,)
+    friction: float = 0.5
+    grip_height: float = 0.0
+    grip_widths: tuple[float, float] | None = None
 
     @property
     def top_heights(self) -> list[float]:
@@ -195,6 +203,20 @@ class Bin:
     size: Array
     slots: Array
     colour: tuple[float, float, float] = (0.6, 0.6, 0.6)
+
+    @cached_property
+    def walls(self) -> Sequence[tuple[Array, Array]]:
+        """Smallest and largest corner of the base of each of the four walls, `(2,)` each [m]."""
+        low = self.position[:2] - self.size[:2] / 2
+        high = self.position[:2] + self.size[:2] / 2
+        outer_low = low - BIN_THICKNESS
+        outer_high = high + BIN_THICKNESS
+        return [
+            (outer_low, np.array([low[0], outer_high[1]])),
+            (np.array([high[0], outer_low[1]]), outer_high),
+            (np.array([low[0], outer_low[1]]), np.array([high[0], low[1]])),
+            (np.array([low[0], high[1]]), np.array([high[0], outer_high[1]])),
+        ]
 
     def contains(self, position: Array, margin: float = 0.0) -> bool:
         """Return True if x and y of `position` `(3,)` [m] are in the floor area, enlarged by `margin` [m]."""

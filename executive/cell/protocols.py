@@ -63,11 +63,18 @@ class Tool(Protocol):
     def load_std(self) -> float:
         """Standard deviation of one reading of `load` [N]."""
 
+    @property
+    def opening(self) -> float:
+        """Measured distance between the fingers [m]; 0 for a tool without fingers."""
+
     def close(self) -> None:
         """Begin to grip, which holds a touched object if the tool can hold it."""
 
-    def open(self) -> None:
-        """Stop to grip, and release the object."""
+    def open(self, opening: float = 0.0) -> None:
+        """Stop to grip, and release the object.
+
+        Fingers move to the distance `opening` [m]; 0: as far as needed to free a held object.
+        """
 
 
 class Camera(Protocol):

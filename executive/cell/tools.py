@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, NamedTuple
@@ -31,17 +31,29 @@ CONTACT_SPACING = 0.0025
 
 @dataclass(frozen=True)
 class ToolPart:
-    """An upright cylinder about the axis of the tool, for collision checks and displays.
+    """An upright cylinder about the axis of the tool, or an upright box, for collision checks and displays.
 
     Attributes:
         offset: Distance from the tool centre point back to the lower end of the part [m].
         length: Length along the axis [m].
-        radius: Radius [m].
+        radius: Radius of the smallest cylinder about the axis that contains the part [m].
+        sides: Side lengths of a box along x and y of the tool [m]; None: the part is a cylinder.
+        centre: Centre of a box, x and y relative to the axis of the tool [m].
     """
 
     offset: float
     length: float
     radius: float
+    sides: tuple[float, float] | None = None
+    centre: tuple[float, float] = (0.0, 0.0)
+
+    @staticmethod
+    def make_box(
+        offset: float, length: float, sides: tuple[float, float], centre: tuple[float, float] = (0.0, 0.0)
+    ) -> ToolPart:
+        """Return a part that is a box; the arguments are as the attributes."""
+        corner = [abs(place) + side / 2 for place, side in zip(centre, sides, strict=True)]
+        return ToolPart(offset, length, math.hypot(*corner), sides, centre)
 
 
 @dataclass(frozen=True)
@@ -54,12 +66,14 @@ class GraspPose:
         proves_absence: True if no object is at the target when the tool touches nothing on the way.
         guard: `touch`: the tool stops at a contact, without which the approach fails; `clear`: a contact is
             a failure.
+        opening: Distance between the fingers before the grasp [m]; 0 for a tool without fingers.
     """
 
     goal: Goal
     contact_height: float
     proves_absence: bool = False
     guard: Literal["touch", "clear"] = "touch"
+    opening: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -150,9 +164,8 @@ class ToolModel(Section):
     def _parse_as_kind(cls, section: Any, parse: Callable[[Any], ToolModel]) -> ToolModel:
         """Parse a section whose declared type is this base class as an instance of the class of its kind."""
         if cls is ToolModel and isinstance(section, dict):
-            # Strict mode converts lists to tuples only from JSON.
-            return cls.select_class(section).model_validate_json(json.dumps(section), strict=True)
-        return parse(section)
+            return cls.select_class(section).model_validate(section, strict=True)
+        return parse(_convert_to_tuples(section))
 
     @classmethod
     def __get_pydantic_json_schema__(
@@ -170,6 +183,23 @@ class ToolModel(Section):
         raise NotImplementedError(f"{type(self).__name__} does not define `parts`")
 
     @property
+    def max_opening(self) -> float:
+        """Largest distance between the fingers [m]; 0 for a tool without fingers."""
+        return 0.0
+
+    def list_parts(self, opening: float) -> Sequence[ToolPart]:  # noqa: ARG002
+        """Return `parts`, and the fingers at an opening [m], the lowest part last."""
+        return self.parts
+
+    def build_links(self) -> str:
+        """Return links and joints of a URDF that hang on the link `tool`; "" for a tool of one rigid part."""
+        return ""
+
+    def compute_joint_positions(self, opening: float) -> Mapping[str, float]:  # noqa: ARG002
+        """Return the positions of the joints of `build_links` by name at an opening [m]."""
+        return {}
+
+    @property
     def max_holding_force(self) -> float:
         """Largest force with which the tool can hold an object [N]."""
         raise NotImplementedError(f"{type(self).__name__} does not define `max_holding_force`")
@@ -181,6 +211,14 @@ class ToolModel(Section):
     def get_hold_height(self, object_class: ObjectClass) -> float:
         """Return the distance from the tool centre point down to the underside of a held object [m]."""
         return object_class.height
+
+    def compute_holding_force(self, object_class: ObjectClass, force: float) -> float:  # noqa: ARG002
+        """Return the maximum force on an object of a class [N] if the sensor of the tool reports `force`."""
+        return force
+
+    def compute_release_opening(self, object_class: ObjectClass) -> float:  # noqa: ARG002
+        """Return the distance between the fingers after the release of an object [m]."""
+        return 0.0
 
     def list_grasps(
         self, object_class: ObjectClass, target: Target, motion: MotionConfig, attempt: GraspAttempt
@@ -214,6 +252,18 @@ class ToolModel(Section):
         """
         return ToolMeasurement()
 
+    def compute_grip_opening(self, object_class: ObjectClass) -> float:  # noqa: ARG002
+        """Return the expected distance between the fingers that hold an object [m]."""
+        return 0.0
+
+    def measure_grip(
+        self,
+        object_class: ObjectClass,  # noqa: ARG002
+        opening: float,  # noqa: ARG002
+    ) -> ToolMeasurement:
+        """Return the evidence of the distance between the fingers that hold an object, `opening` [m]."""
+        return ToolMeasurement()
+
     def find_distinct_labels(self, classes: Mapping[str, ObjectClass]) -> Collection[str]:  # noqa: ARG002
         """Return the classes that a measurement of the tool distinguishes from all other `classes`."""
         return ()
@@ -225,6 +275,13 @@ class ToolModel(Section):
         `noise_seed` is the random seed of the noise of the load.
         """
         raise NotImplementedError(f"{type(self).__name__} does not define `build_sim`")
+
+
+def _convert_to_tuples(value: Any) -> Any:
+    """Return a value with tuples instead of lists, which strict mode does not convert."""
+    if isinstance(value, dict):
+        return {key: _convert_to_tuples(entry) for key, entry in value.items()}
+    return tuple(map(_convert_to_tuples, value)) if isinstance(value, list) else value
 
 
 def load_tool_models() -> dict[str, type[ToolModel]]:

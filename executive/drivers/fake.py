@@ -53,12 +53,14 @@ class FakeTool:
     can_hold: Callable[[], bool] = field(default=lambda: True)
     force: float = 7.9
     load_error: float = 0.0
+    _opening: float = 0.0
     _noise: float = 1e-9  # It alternates, so that the load cell does not seem broken.
 
     @property
     def touching(self) -> bool:
         tip_position = self.get_tip_position()
-        return self.world.find_touched_object(tip_position) is not None or float(tip_position[2]) <= 0.0
+        is_on_object = not self.model.max_opening and self.find_object() is not None
+        return is_on_object or float(tip_position[2]) <= 0.0
 
     @property
     def holding(self) -> bool:
@@ -79,17 +81,28 @@ class FakeTool:
         force = self.world.classes[held.label].mass * GRAVITY if held else 0.0
         return force + self.load_error + self._noise
 
+    @property
+    def opening(self) -> float:
+        held = self.world.held_object
+        return self.model.compute_grip_opening(self.world.classes[held.label]) if held else self._opening
+
+    def find_object(self) -> TrueObject | None:
+        """Return the object that the tool touches or has between its fingers, or None."""
+        return self.world.find_touched_object(self.get_tip_position(), self.model.get_hold_height)
+
     def close(self) -> None:
         self.world.is_commanded = True
-        touched = self.world.find_touched_object(self.get_tip_position())
+        self._opening = 0.0
+        touched = self.find_object()
         if touched is None or self.model.explain_unsuitable(self.world.classes[touched.label]):
             return
         if self.can_hold():
             touched.is_dropped = False
             self.world.held_object = touched
 
-    def open(self) -> None:
+    def open(self, opening: float = 0.0) -> None:
         self.world.is_commanded = True
+        self._opening = opening or self.model.max_opening
         self.world.release()
 
     def lose_grip(self) -> None:

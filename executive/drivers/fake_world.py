@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from itertools import product
 
@@ -114,11 +114,17 @@ class FakeWorld:
             corners = np.array([(x * length / 2, y * width / 2, 0.0) for x, y in RECTANGLE])
         return fake_object.X_WO.apply(corners @ rotate_about_z(object_class.yaw_offset).T)
 
-    def find_touched_object(self, tip_position: Array) -> TrueObject | None:
-        """Return the object that a tool at `tip_position` `(3,)` [m] touches from above, or None."""
+    def find_touched_object(
+        self, tip_position: Array, get_hold_height: Callable[[ObjectClass], float]
+    ) -> TrueObject | None:
+        """Return the object that a tool at `tip_position` `(3,)` [m] can hold, or None.
+
+        `get_hold_height` returns the distance from the tool centre point down to the underside of an object.
+        """
         for fake_object in self.objects:
             object_class = self.classes[fake_object.label]
-            gap = abs(float(fake_object.position[2]) + object_class.height / 2 - tip_position[2])
+            underside = float(fake_object.position[2]) - object_class.height / 2
+            gap = abs(underside + get_hold_height(object_class) - tip_position[2])
             if gap > TOUCH_DISTANCE or fake_object is self.held_object:
                 continue
             distance = float(np.linalg.norm(fake_object.position[:2] - tip_position[:2]))

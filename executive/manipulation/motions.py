@@ -26,6 +26,10 @@ MAX_ARRIVAL_ERROR = 0.02
 """Maximum distance between the tool and the goal of a transport that was not interrupted [m]."""
 LOAD_CHECK_TIME = 0.1
 """Time between two readings of the load, and between closing the tool and reading its sensor [s]."""
+FINGER_CHECK_TIME = 0.05
+"""Time in which fingers at rest keep their distance [s]."""
+MAX_OPENING_CHANGE = 5e-4
+"""Maximum change of the distance between fingers at rest in this time [m]."""
 MAX_PLANNING_ATTEMPTS = 3
 """Maximum number of planning attempts for one motion; an update of the ledger may change goal or task."""
 
@@ -119,21 +123,22 @@ def plan(
     Args:
         skill: The skill that moves the arm.
         arm: The arm.
-        find_goal_and_task: Function that returns the current goal (or the name of a pose) and task.
+        find_goal_and_task: Function that returns the current goal (or the name of a pose) and task, or raises
+            Blocked.
 
     Raises:
         SkillFailed: No motion was found; the reason is `unreachable` or `blocked`.
     """
     yield  # The first control step of a skill already has a high computational load.
     yield from wait_for_rest(arm)
-    for _ in range(MAX_PLANNING_ATTEMPTS):
-        goal, task = find_goal_and_task()
-        planning = arm.plan(goal, task)
-        while not planning.ready:
-            yield
-        if find_goal_and_task() == (goal, task):
-            break
     try:
+        for _ in range(MAX_PLANNING_ATTEMPTS):
+            goal, task = find_goal_and_task()
+            planning = arm.plan(goal, task)
+            while not planning.ready:
+                yield
+            if find_goal_and_task() == (goal, task):
+                break
         return planning.result()
     except (Unreachable, Blocked) as error:
         reason = "blocked" if isinstance(error, Blocked) else "unreachable"
@@ -220,6 +225,7 @@ def release(
     is_stuck = False
     try:
         yield from cell.clock.sleep(settle)
+        yield from wait_for_fingers(cell)
         is_stuck = cell.tool.holding or (falls and (cell.tool.touching or is_loaded(cell, item) is True))
     finally:
         if not (is_stuck or cell.tool.holding):
@@ -228,6 +234,16 @@ def release(
         raise skill.failure("stuck", f"{item} hangs on the tool {settle:.2f} s after release")
     # The ledger compares the zero with that before the approach.
     cell.ledger.record_empty_load(cell.tool.load)
+
+
+def wait_for_fingers(cell: Cell) -> Steps:
+    """Yield until the distance between the fingers stays the same; end at once for a tool without fingers."""
+    if not cell.tool_model.max_opening:
+        return
+    previous_opening = math.inf
+    while abs(cell.tool.opening - previous_opening) > MAX_OPENING_CHANGE:
+        previous_opening = cell.tool.opening
+        yield from cell.clock.sleep(FINGER_CHECK_TIME)
 
 
 def is_loaded(cell: Cell, item: Item) -> bool | None:
@@ -287,13 +303,19 @@ def verify_grasp(skill: Skill, cell: Cell, item: Item, goal: Goal) -> Steps:
 def make_task(cell: Cell) -> Task:
     """Return the task of a motion: all obstacles, and the item in the tool as the load."""
     held_item = cell.ledger.find_held_item()
-    return Task(obstacles=list_obstacles(cell)) if held_item is None else make_transport_task(cell, held_item)
+    if held_item is not None:
+        return make_transport_task(cell, held_item)
+    # The opening is rounded up, so that its noise does not change the task.
+    opening = math.ceil(cell.tool.opening * 1000) / 1000 if cell.tool_model.max_opening else 0.0
+    return Task(obstacles=list_obstacles(cell), opening=opening)
 
 
 def make_transport_task(cell: Cell, item: Item) -> Task:
     """Return the task of a motion with `item` as the load, and with all other objects as obstacles."""
     object_class = cell.classes[cell.ledger.get_label(item)]
-    return Task(object_class, cell.tool.holding_force, list_obstacles(cell, item))
+    force = cell.tool_model.compute_holding_force(object_class, cell.tool.holding_force)
+    opening = cell.tool_model.compute_grip_opening(object_class)
+    return Task(object_class, force, list_obstacles(cell, item), opening=opening)
 
 
 MAX_PREDICTABLE_SPEED = 0.2

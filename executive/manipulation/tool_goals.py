@@ -9,12 +9,11 @@ from itertools import product
 
 import numpy as np
 
-from executive.cell.arm import Goal, Task
+from executive.cell.arm import Goal
 from executive.cell.frame import Detection, Frame
 from executive.cell.objects import BIN_THICKNESS, Bin, Item, ObjectClass, Obstacle, Target, is_quota_reached
 from executive.cell.protocols import Cell
-from executive.cell.tools import CONTACT_SPACING, OVERTRAVEL, GraspAttempt, GraspPose
-from executive.errors import Fault, NoDepth
+from executive.errors import NoDepth
 
 MAX_ROLL_DISTANCE = 0.002
 """Maximum distance that an object rolls in a bin after its release [m]."""
@@ -106,30 +105,6 @@ def _list_bin_obstacles(cell: Cell, excluded_item: Item | None) -> Iterator[Obst
             yield Obstacle(float(x), float(y), radius, top, f"the objects in slot {index + 1} of {bin_name}")
 
 
-def choose_grasp(
-    cell: Cell, target: Target, overtravel: float = OVERTRAVEL, spacing: float = CONTACT_SPACING
-) -> tuple[GraspPose, Task]:
-    """Return the best grasp of a target, and the task of the approach; each attempt has another grasp.
-
-    Args:
-        cell: The work cell.
-        target: Target to grasp.
-        overtravel: As in `GraspAttempt` [m].
-        spacing: As in `GraspAttempt` [m].
-    """
-    attempt = GraspAttempt(
-        cell.ledger.describe(target.item).attempts,
-        cell.ledger.is_confirmed_by_tool(target.label),
-        overtravel,
-        spacing,
-    )
-    object_class = cell.classes[target.label]
-    grasps = cell.tool_model.list_grasps(object_class, target, cell.motion, attempt)
-    if not grasps:
-        raise Fault(f'the tool "{cell.tool_model.kind}" lists no grasp of a {target.label}')
-    return grasps[0], Task(obstacles=list_obstacles(cell, target.item), target=make_obstacle(cell, target))
-
-
 def sort_pickable_targets(cell: Cell, targets: Sequence[Target]) -> list[Target]:
     """Return the targets that can be picked, sorted by their distance from the destination of the arm.
 
@@ -187,7 +162,7 @@ def explain_uncertain_bin(cell: Cell, bin_name: str, item: Item) -> str:
     )
 
 
-def make_bin_goal(cell: Cell, bin_name: str, item: Item, drop_height: float = DROP_HEIGHT) -> Goal:
+def make_bin_goal_at_any_yaw(cell: Cell, bin_name: str, item: Item, drop_height: float = DROP_HEIGHT) -> Goal:
     """Return the tool goal at which `item` is `drop_height` [m] above the next slot of a bin."""
     next_slot_index = predict_next_slot_index(cell, bin_name, item)
     hold_height = cell.tool_model.get_hold_height(cell.classes[cell.ledger.get_label(item)])

@@ -229,11 +229,12 @@ def check_loads(
     but it never lifts with less than `min_lift_acceleration`. `compute_mass` is that of the checker; if
     it is None, only classes with a declared mass are checked.
     """
-    force = config.tool.max_holding_force
     safety_factor = config.tool.safety_factor
     for label in sorted(mission.routes.keys() & config.objects.keys()):
         section = config.objects[label]
-        if problem := config.tool.explain_unsuitable(section.build_class(label)):
+        object_class = section.build_class(label)
+        force = config.tool.compute_holding_force(object_class, config.tool.max_holding_force)
+        if problem := config.tool.explain_unsuitable(object_class):
             hint = "Delete the route, or use another tool."
             yield make_error(cell.find_span(("objects", label), at_key=True), "robot", problem, hint)
             continue

@@ -54,12 +54,12 @@ class Discs(NamedTuple):
     min_cosine: float
 
 
-def make_tool_discs(config: CellConfig, load: ObjectClass | None) -> Discs:
+def make_tool_discs(config: CellConfig, load: ObjectClass | None, opening: float = 0.0) -> Discs:
     """Return the discs of the tool and its load: one at the lower end of each part, two of the load.
 
-    Parts inside the cylinder of the load have no disc.
+    Parts inside the cylinder of the load have no disc. `opening` is the distance between the fingers [m].
     """
-    parts = config.tool.parts[::-1]
+    parts = config.tool.list_parts(opening)[::-1]
     if load is None:
         radii = np.array([part.radius for part in parts])
         return Discs(np.array([-part.offset for part in parts]), radii, MIN_COSINE_UNLOADED)
@@ -278,20 +278,11 @@ def _build_prisms(config: CellConfig, obstacles: Sequence[Obstacle]) -> Prisms:
     for name, bin in config.bins.items():
         x, y, bottom = bin.position
         length, width, height = bin.size
-        left = x - length / 2
-        right = x + length / 2
-        front = y - width / 2
-        back = y + width / 2
-        outer_front = front - BIN_THICKNESS
-        outer_back = back + BIN_THICKNESS
-        for wall in (
-            ((left - BIN_THICKNESS, outer_front), (left, outer_back)),
-            ((right, outer_front), (right + BIN_THICKNESS, outer_back)),
-            ((left, outer_front), (right, front)),
-            ((left, back), (right, outer_back)),
-        ):
-            rows.append((*wall, 0.0, bottom + height, False, False, name))
-        floor = ((left, front), (right, back), 0.0, bottom + BIN_THICKNESS)
+        for low, high in bin.build_bin(name).walls:
+            rows.append(((*low,), (*high,), 0.0, bottom + height, False, False, name))
+        low_corner = (x - length / 2, y - width / 2)
+        high_corner = (x + length / 2, y + width / 2)
+        floor = (low_corner, high_corner, 0.0, bottom + BIN_THICKNESS)
         rows.append((*floor, False, True, f"the floor of {name}"))
     for obstacle in obstacles:
         centre = (obstacle.x, obstacle.y)

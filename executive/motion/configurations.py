@@ -26,6 +26,9 @@ from executive.motion.joints import BranchKey, JointLimits, JointRange, Kinemati
 
 PREFERRED_LIMIT_DISTANCE = math.radians(1.0)
 """Preferred minimum distance of joint positions from their limits [rad]."""
+LIMIT_DISTANCE_OF_YAWS = math.radians(10.0)
+"""Preferred minimum distance of joint positions from their limits [rad] if the yaw is fixed: the last joint
+may move towards its limit in the straight departure, and must then stop."""
 COARSE_ANGLE_STEP = math.radians(5.0)
 """Distance between the redundancy angles in the first search for configurations [rad]."""
 FINE_ANGLE_STEP = math.radians(0.25)
@@ -75,7 +78,10 @@ def find_configuration_pairs(
     poses = [make_tool_down_pose((x, y, z + length)), make_tool_down_pose((x, y, z))]
     direction = _find_turn_direction(kinematics, q_start)
     yaws: list[float | None] = [direction * yaw for yaw in goal.yaws] or [None]
-    for angle_step, margin in ((COARSE_ANGLE_STEP, PREFERRED_LIMIT_DISTANCE), (FINE_ANGLE_STEP, 0.0)):
+    searches = [(COARSE_ANGLE_STEP, PREFERRED_LIMIT_DISTANCE), (FINE_ANGLE_STEP, 0.0)]
+    if goal.yaws:
+        searches.insert(0, (COARSE_ANGLE_STEP, LIMIT_DISTANCE_OF_YAWS))
+    for angle_step, margin in searches:
         (upper_qs, lower_qs), branches = kinematics.solve_all(poses, q_start, angle_step)
         joint_range = kinematics.joint_range.shrink(margin)
         pairs_by_yaw = [

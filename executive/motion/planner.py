@@ -186,7 +186,7 @@ def _find_path(kinematics: Kinematics, start: Array, goal: Goal | Array, rise: f
 def _require_clearance(config: CellConfig, kinematics: Kinematics, qs: Array, task: Task) -> None:
     """Raise Blocked if tool or load come too near to an obstacle at joint positions `(N, n)` [rad]."""
     tcps, axes = kinematics.compute_tcps_and_axes(qs)
-    discs = make_tool_discs(config, task.load)._replace(min_cosine=-1.0)
+    discs = make_tool_discs(config, task.load, task.opening)._replace(min_cosine=-1.0)
     # Only other objects may be as near as they are at the ends: the goal may not be inside table or bins.
     for obstacles, min_margin in (((), 0.0), (task.obstacles, -math.inf)):
         clearance = ClearanceModel(config, obstacles, tcps[[0, -1], :2], discs)

@@ -73,7 +73,7 @@ class MotionSearch:
         self._travel_height = config.travel_height
         self._end = end
         self._straight_part_length = config.motion.straight
-        discs = make_tool_discs(config, task.load)
+        discs = make_tool_discs(config, task.load, task.opening)
         start_tcp_and_axis = kinematics.compute_tcps_and_axes(start[None])
         if isinstance(end, Goal):
             x, y, z = end.position

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.arms.urdf import (
+    ATTACHED,
     JointChain,
     describe_place,
     find_model,
@@ -27,6 +28,8 @@ from executive.arms.urdf import (
 )
 from executive.cell.arm_config import TOOL_LINK, ArmConfig, ArmFile, FlangeConfig
 from executive.cell.config import CellConfig
+from executive.cell.device_config import Angles
+from executive.cell.tools import ToolPart
 from executive.errors import InputError
 from executive.geometry import Array, Pose, rotate_about_z
 from executive.physics.model_files import check_files, convert_model, find_mesh, is_shipped, read_shape
@@ -75,18 +78,54 @@ def build_arm_urdf(config: CellConfig, *, visuals: bool) -> str:
     for element in _list_parts(robot, chain):
         is_link = element.tag == "link"
         result.append(_complete_link(path, element, visuals=visuals) if is_link else element)
-    for mesh in result.iter("mesh"):
-        file = find_mesh(path, mesh)
-        # PyBullet reads the STL files of pybullet_data; the conversion would import trimesh.
-        name = str(file) if is_shipped(file) else convert_model(file, MAX_ARM_TRIANGLE_COUNT)
-        mesh.set("filename", name)
-    for texture in result.iter("texture"):
-        texture.set("filename", str(find_mesh(path, texture)))
+    _resolve_files(path, result)
     for number, material in enumerate(result.iter("material")):
         material.set("name", material.get("name", f"material_{number}"))  # PyBullet needs a name.
     ElementTree.indent(result)  # PyBullet cannot read long lines.
     text = ElementTree.tostring(result, encoding="unicode")
     return text.removesuffix("</robot>") + _build_tool_urdf(config)
+
+
+def _resolve_files(path: Path, robot: Element) -> None:
+    """Replace the names of meshes and textures by absolute paths of files that PyBullet can read."""
+    for mesh in robot.iter("mesh"):
+        file = find_mesh(path, mesh)
+        # PyBullet reads the STL files of pybullet_data; the conversion would import trimesh.
+        name = str(file) if is_shipped(file) else convert_model(file, MAX_ARM_TRIANGLE_COUNT)
+        mesh.set("filename", name)
+    for texture in robot.iter("texture"):
+        texture.set("filename", str(find_mesh(path, texture)))
+
+
+def build_attached_links(urdf: str, rotation_deg: Angles) -> str:
+    """Return links and joints of a URDF whose base hangs on the link of the tool, turned by `rotation_deg`.
+
+    The names get the prefix `ATTACHED`, because names of the arm may be equal.
+    """
+    path = find_model(urdf)
+    robot = read_robot(path)
+    children = {child.get("link") for child in robot.iterfind("joint/child")}
+    bases = [link.get("name", "") for link in robot.iterfind("link") if link.get("name") not in children]
+    if len(bases) != 1:
+        raise InputError(f"the model {path.name} has {len(bases)} base links; a tool has one")
+    result = Element("robot")
+    for link in robot.iterfind("link"):
+        result.append(_complete_link(path, link, visuals=True))
+    for joint in robot.iterfind("joint"):
+        for end in (*joint.findall("parent"), *joint.findall("child")):
+            end.set("link", ATTACHED + end.get("link", ""))
+        result.append(joint)
+    for element in result:
+        element.set("name", ATTACHED + element.get("name", ""))
+    _resolve_files(path, result)
+    for number, material in enumerate(result.iter("material")):
+        material.set("name", f"{ATTACHED}material_{number}")
+    mount = ElementTree.SubElement(result, "joint", name=f"{ATTACHED}mount", type="fixed")
+    ElementTree.SubElement(mount, "parent", link=TOOL_LINK)
+    ElementTree.SubElement(mount, "child", link=ATTACHED + bases[0])
+    ElementTree.SubElement(mount, "origin", xyz="0 0 0", rpy=" ".join(map(str, np.radians(rotation_deg))))
+    ElementTree.indent(result)  # PyBullet cannot read long lines.
+    return "".join(ElementTree.tostring(element, encoding="unicode") for element in result)
 
 
 def _list_parts(robot: Element, chain: JointChain) -> list[Element]:
@@ -128,10 +167,10 @@ def _build_tool_urdf(config: CellConfig) -> str:
     parts = "".join(
         part_template.substitute(
             centre=tool.length - part.offset - part.length / 2,
-            length=part.length,
-            radius=part.radius,
-            collision_length=part.length - 2 * CYLINDER_MARGIN,
-            collision_radius=part.radius - CYLINDER_MARGIN,
+            x=part.centre[0],
+            y=part.centre[1],
+            visual=_describe_shape(part, 0.0),
+            collision=_describe_shape(part, 0.0 if part.sides else CYLINDER_MARGIN),
         )
         for part in tool.parts
     )
@@ -143,7 +182,15 @@ def _build_tool_urdf(config: CellConfig) -> str:
         "mass": TOOL_MASS,
         "parts": parts,
     }
-    return Template(text_of_tool).substitute(values) + "</robot>"
+    return Template(text_of_tool).substitute(values) + tool.build_links() + "</robot>"
+
+
+def _describe_shape(part: ToolPart, margin: float) -> str:
+    """Return the shape of a part of the tool in a URDF, smaller by `margin` [m] on all sides."""
+    length = part.length - 2 * margin
+    if part.sides is None:
+        return f'<cylinder length="{length}" radius="{part.radius - margin}"/>'
+    return f'<box size="{part.sides[0]} {part.sides[1]} {length}"/>'
 
 
 class ArmHulls:

@@ -35,6 +35,8 @@ POSITION_B = 6
 NORMAL = 7
 DISTANCE = 8
 NORMAL_FORCE = 9
+JOINT_TYPE = 2
+"""Index of the type of the joint in the information about a joint of PyBullet."""
 JOINT_NAME = 1
 """Index of the name of the joint in the information about a joint of PyBullet."""
 LINK_NAME = 12
@@ -58,6 +60,7 @@ class CellWorld:
         joint_counts: Number of joints before each link of the arm, by the index of the link; -1: the base.
         has_vertical_axis: True if the axis of the first joint is vertical.
         tool_index: Index of the link of the tool, whose frame is the frame of the flange.
+        tool_joints: Indices of the moving joints of the tool, by name, which are also those of their links.
         table, floor: Bodies of the table and of the floor under the table.
         bin_bodies: Body of each bin, by name.
     """
@@ -92,8 +95,17 @@ class CellWorld:
         self.tool_index = self.find_link(TOOL_LINK)
         joint_names = [info[JOINT_NAME].decode() for info in infos]
         self.joints = [joint_names.index(name) for name in chain.joints]
-        counts = {name: count for name, (count, _) in chain.places.items()} | {TOOL_LINK: len(self.joints)}
-        self.joint_counts = {-1: 0, **{index: counts[name] for index, name in enumerate(link_names)}}
+        # The links of the tool are the only ones that do not belong to the chain.
+        counts = {name: count for name, (count, _) in chain.places.items()}
+        link_counts = [counts.get(name, len(self.joints)) for name in link_names]
+        self.joint_counts = {-1: 0, **dict(enumerate(link_counts))}
+        self._tool_links = {index for index, name in enumerate(link_names) if name not in counts}
+        self.tool_joints = {
+            name: index
+            for index, name in enumerate(joint_names)
+            if index in self._tool_links and infos[index][JOINT_TYPE] != pybullet.JOINT_FIXED
+        }
+        self.set_opening(config.tool.max_opening)
         self.bin_bodies = {name: add_bin(self.client, bin) for name, bin in config.bins.items()}
         self.set_joint_positions(np.radians(config.arm.poses_deg["home"]))
 
@@ -101,13 +113,22 @@ class CellWorld:
         """Return the index of a link of the arm, by its name in the URDF; -1 for the base."""
         return self._link_names.index(name) - 1
 
+    def is_tool(self, link: int) -> bool:
+        """Return True if a link of the arm belongs to the tool, by its index."""
+        return link in self._tool_links
+
+    def set_opening(self, opening: float) -> None:
+        """Move the fingers of the tool to a distance [m] at once, without physics."""
+        for name, position in self.config.tool.compute_joint_positions(opening).items():
+            self.client.resetJointState(self.arm, self.tool_joints[name], position)
+
     def get_link_name(self, link: int) -> str:
         """Return the name of a link of the arm in the URDF, by its index."""
         return self._link_names[link + 1]
 
     def name_link(self, link: int) -> str:
         """Return the name of a link of the arm for messages, by its index."""
-        if link == self.tool_index:
+        if self.is_tool(link):
             return "the tool"
         count = self.joint_counts[link]
         return f"link {count}" if count else "the base of the arm"

@@ -127,6 +127,7 @@ class ClearanceChecker:
         load = task.load
         load_size = load.height + load.radius + load.contact_radius if load else 0.0
         pairs = self._list_pairs(load, self._place_obstacles(task.obstacles))
+        self.world.set_opening(task.opening)
         movements = np.abs(np.diff(path, axis=0, prepend=path[:1])).cumsum(axis=0) * (self._radii + load_size)
         # Upper bound of the movement since the start of the path [m], by pair and state.
         pair_movements = [movements[:, pair.joints].sum(axis=1).tolist() for pair in pairs]

@@ -147,8 +147,11 @@ def find_payload_errors(
     efforts = np.array(config.arm.effort)
     for name, pose in poses_deg.items():
         q = np.radians(pose)
-        still = [0.0] * len(pose)
-        torques = np.array(world.client.calculateInverseDynamics(world.arm, q.tolist(), still, still))
+        # The joints of the tool come after those of the arm.
+        still = [0.0] * (len(pose) + len(world.tool_joints))
+        positions = [*q.tolist(), *still[len(pose) :]]
+        torques = np.array(world.client.calculateInverseDynamics(world.arm, positions, still, still))
+        torques = torques[: len(pose)]
         steps = q + DIFFERENTIATION_STEP * np.eye(len(q))
         heights = kinematics.compute_tcps_and_axes(np.vstack([q, steps]))[0][:, 2]
         torques += mass * GRAVITY * (heights[1:] - heights[0]) / DIFFERENTIATION_STEP

@@ -10,13 +10,12 @@ from at_hand import look, pick
 
 from executive.cell.arm import Goal
 from executive.cell.objects import BIN_THICKNESS, Target
+from executive.manipulation.grasps import choose_grasp, make_bin_goal
 from executive.manipulation.motions import make_task, make_transport_task
 from executive.manipulation.tool_goals import (
     DROP_HEIGHT,
     MIN_GAP,
-    choose_grasp,
     list_obstacles,
-    make_bin_goal,
     make_put_down_goal,
     make_slot_goal,
     predict_object_count,

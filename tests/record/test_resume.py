@@ -219,7 +219,7 @@ class UnwillingCell(FakeCell):
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
         first = self.world.objects[0]
-        self.tool.can_hold = lambda: self.world.find_touched_object(self.arm.tool_pose.position) is not first
+        self.tool.can_hold = lambda: self.tool.find_object() is not first
 
 
 @pytest.mark.slow

@@ -37,7 +37,7 @@ def running(run: Run) -> list[str]:
 
 
 def never_seal(fake: FakeCell, stubborn: TrueObject) -> None:
-    fake.tool.can_hold = lambda: fake.world.find_touched_object(fake.arm.tool_pose.position) is not stubborn
+    fake.tool.can_hold = lambda: fake.tool.find_object() is not stubborn
 
 
 def always_slip(fake: FakeCell, stubborn: TrueObject) -> None:

@@ -189,7 +189,7 @@ class SimArm:
         if self._braking_times is None:
             self._check_guard()
         if self._braking_times is None:
-            tip_may_touch = self.motion_time >= motion.guarded_start_time
+            tip_may_touch = self._guard.touch and self.motion_time >= motion.guarded_start_time
             message, self.contact_point = self._contact_monitor.find_new_contact(tip_may_touch)
             if not message and np.abs(self.q - self.commanded_q).max() > TRACKING_TOLERANCE:
                 message = self._describe_disturbance(TRACKING_TOLERANCE)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -249,9 +250,9 @@ class WorldRebuilder:
         elif kind in (world_log.REMOVE, world_log.FORGET):
             world.remove_object(int(numbers[0]), is_counted=kind == world_log.REMOVE)
         else:
-            actions = {
+            actions: dict[str, Callable[[], object]] = {
                 world_log.CLOSE: tool.close,
-                world_log.OPEN: tool.open,
+                world_log.OPEN: partial(tool.open, *numbers.tolist()),
                 world_log.GRIP_LOST: tool.lose_grip,
             }
             actions[kind]()

@@ -115,7 +115,11 @@ class SimTool:
         if self._grip is None:
             self._try_to_grip()
 
-    def open(self) -> None:
+    @property
+    def opening(self) -> float:
+        return 0.0
+
+    def open(self, opening: float = 0.0) -> None:  # noqa: ARG002
         self._world.log_command(world_log.OPEN)
         self._separating_body = None
         if self._grip is not None:

@@ -1,0 +1,144 @@
+"""Choice of a grasp, and of yaws at which the fingers of a tool stay clear of objects and bin walls."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from executive.cell.arm import Goal, Task
+from executive.cell.objects import Item, Obstacle, Target
+from executive.cell.protocols import Cell
+from executive.cell.tools import CONTACT_SPACING, OVERTRAVEL, GraspAttempt, GraspPose, ToolPart
+from executive.errors import Blocked, Fault
+from executive.geometry import Array
+from executive.manipulation.tool_goals import (
+    DROP_HEIGHT,
+    list_obstacles,
+    make_bin_goal_at_any_yaw,
+    make_obstacle,
+)
+
+YAW_COUNT = 24
+"""Number of yaws that are tried if every yaw is permitted."""
+POINT_SPACING = 0.004
+"""Maximum distance between the points that represent the base of a part of the tool [m]."""
+SAFETY_DISTANCE = 0.002
+"""Distance in addition to the margin of the cell file [m], so that the planner does not need the last
+millimetre."""
+
+
+def choose_grasp(
+    cell: Cell, target: Target, overtravel: float = OVERTRAVEL, spacing: float = CONTACT_SPACING
+) -> tuple[GraspPose, Task]:
+    """Return the best grasp of a target, and the task of the approach; each attempt has another grasp.
+
+    Args:
+        cell: The work cell.
+        target: Target to grasp.
+        overtravel: As in `GraspAttempt` [m].
+        spacing: As in `GraspAttempt` [m].
+
+    Raises:
+        Blocked: The fingers would hit a neighbour or a wall at every grasp; the message names it.
+    """
+    attempt = GraspAttempt(
+        cell.ledger.describe(target.item).attempts,
+        cell.ledger.is_confirmed_by_tool(target.label),
+        overtravel,
+        spacing,
+    )
+    object_class = cell.classes[target.label]
+    grasps = cell.tool_model.list_grasps(object_class, target, cell.motion, attempt)
+    if not grasps:
+        raise Fault(f'the tool "{cell.tool_model.kind}" lists no grasp of a {target.label}')
+    obstacles = list_obstacles(cell, target.item)
+    blocker = ""
+    for grasp in grasps:
+        yaws, name = find_free_yaws(cell, grasp.goal, grasp.opening, obstacles)
+        blocker = blocker or name
+        if yaws is not None:
+            task = Task(obstacles=obstacles, target=make_obstacle(cell, target), opening=grasp.opening)
+            return replace(grasp, goal=replace(grasp.goal, yaws=yaws)), task
+    raise Blocked(f"the open fingers have no space beside {target.item}: {blocker} is in the way")
+
+
+def has_free_grasp(cell: Cell, target: Target) -> bool:
+    """Return True if neither neighbours nor bin walls block every grasp of a target."""
+    if not cell.tool_model.max_opening:
+        return True
+    try:
+        choose_grasp(cell, target)
+    except Blocked:
+        return False
+    return True
+
+
+def make_bin_goal(cell: Cell, bin_name: str, item: Item, drop_height: float = DROP_HEIGHT) -> Goal:
+    """Return the tool goal at which `item` is `drop_height` [m] above the next slot of a bin.
+
+    Fingers that open there do not hit walls or objects, if there is such a yaw.
+    """
+    goal = make_bin_goal_at_any_yaw(cell, bin_name, item, drop_height)
+    opening = cell.tool_model.compute_release_opening(cell.classes[cell.ledger.get_label(item)])
+    yaws, _ = find_free_yaws(cell, goal, opening, list_obstacles(cell, item))
+    return replace(goal, yaws=yaws or ())
+
+
+def find_free_yaws(
+    cell: Cell, goal: Goal, opening: float, obstacles: Sequence[Obstacle]
+) -> tuple[tuple[float, ...] | None, str]:
+    """Return the permitted yaws of a goal [rad] at which the fingers are clear of obstacles and bin walls.
+
+    The yaws are () if every yaw is permitted and free, and None if no yaw is free; the name of an obstacle
+    is then the second value. `opening` is the distance between the fingers [m].
+    """
+    if not cell.tool_model.max_opening:
+        return goal.yaws, ""
+    parts = cell.tool_model.list_parts(opening)
+    candidates = goal.yaws or tuple(math.tau * index / YAW_COUNT for index in range(YAW_COUNT))
+    blockers = [_find_blocker(cell, goal, parts, yaw, obstacles) for yaw in candidates]
+    free_yaws = tuple(yaw for yaw, name in zip(candidates, blockers, strict=True) if not name)
+    if len(free_yaws) == len(candidates):
+        return goal.yaws, ""
+    return (free_yaws or None), next(filter(None, blockers))
+
+
+def _find_blocker(
+    cell: Cell, goal: Goal, parts: Sequence[ToolPart], yaw: float, obstacles: Sequence[Obstacle]
+) -> str:
+    """Return the name of an obstacle or bin that a part of the tool would hit at the goal, or ""."""
+    margin = cell.motion.margin + SAFETY_DISTANCE
+    x, y, z = goal.position
+    # The tool points down: its y axis is opposite to that of a frame with the same yaw.
+    rotation = np.array([[math.cos(yaw), math.sin(yaw)], [math.sin(yaw), -math.cos(yaw)]])
+    for part in parts:
+        bottom = z + part.offset - margin
+        points = _list_base_points(part) @ rotation.T + (x, y)
+        enlargement = margin if part.sides else margin + part.radius
+        for obstacle in obstacles:
+            if bottom < obstacle.top:
+                distances = np.hypot(*(points - (obstacle.x, obstacle.y)).T)
+                if distances.min() < obstacle.radius + enlargement:
+                    return obstacle.name
+        for bin in cell.bins.values():
+            if bottom < bin.position[2] + bin.size[2]:
+                for low, high in bin.walls:
+                    outside = np.maximum(np.maximum(low - points, points - high), 0.0)
+                    if np.hypot(*outside.T).min() < enlargement:
+                        return f"the wall of {bin.name}"
+    return ""
+
+
+def _list_base_points(part: ToolPart) -> Array:
+    """Return points `(N, 2)` [m] on the base of a box in the frame of the tool; of a cylinder, the centre."""
+    if part.sides is None:
+        return np.zeros((1, 2))
+    counts = [math.ceil(side / POINT_SPACING) + 1 for side in part.sides]
+    ranges = [
+        centre + np.linspace(-side / 2, side / 2, count)
+        for centre, side, count in zip(part.centre, part.sides, counts, strict=True)
+    ]
+    return np.stack(np.meshgrid(*ranges), axis=-1).reshape(-1, 2)
