@@ -1,0 +1,305 @@
+"""Gripper with two parallel fingers: section, parts, grasps with the yaw of the object, and evidence."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
+from string import Template
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from executive.arms.urdf import read_couplings
+from executive.cell.arm import Goal
+from executive.cell.device_config import Angles, Distance, Force, Length, MotionConfig, Section
+from executive.cell.objects import ObjectClass, Target
+from executive.cell.tools import GraspAttempt, GraspPose, ToolMeasurement, ToolModel, ToolPart
+
+if TYPE_CHECKING:
+    from executive.drivers.sim.fingers import SimFingers
+    from executive.drivers.sim.world import World
+
+FINGER_JOINTS = ("tool_finger_1", "tool_finger_2")
+"""Names of the joints of the fingers; each position is half of the opening [m]."""
+MIN_TIP_HEIGHT = 0.003
+"""Minimum height of the tips above the support of the object [m]: tips that press on a table cannot close."""
+TIP_CLEARANCE = 0.002
+"""Distance between the tips and the top of an object at the start of the descent, beyond the margin of the
+cell file [m]."""
+PALM_CLEARANCE = 0.003
+"""Minimum distance between the palm and the top of a held object [m]."""
+MIN_GRIP_WIDTH = 0.002
+"""Minimum distance of fingers that hold an object beyond that of the closed fingers [m]."""
+OPENING_STEP = 0.004
+"""Increase of the opening after each failed attempt, because the object may lie beside its place [m]."""
+TOLERATED_YAW_ERROR = 3.0
+"""Error of the yaw of an object for which the opening leaves space, in standard deviations."""
+
+
+class FingerModel(Section):
+    """Model of a gripper whose fingers move by coupled joints, in a URDF with `<mimic>`."""
+
+    urdf: str
+    """Path of the URDF, relative to the cell file or `package:NAME/...`, as of an arm."""
+    rotation_deg: Angles = (0.0, 0.0, 0.0)
+    """Rotation of the model on the flange: roll, pitch, yaw [degree]. The fingers then close along y."""
+    joint: str
+    """Name of the joint with the motor."""
+    openings: tuple[tuple[float, float], ...] = Field(min_length=2)
+    """Positions of this joint [rad or m], each with the distance between the pads [m]."""
+    effort: Force
+    """Torque [Nm] or force [N] of the motor with which each finger presses with `force`."""
+
+
+class Fingers(ToolModel):
+    """A gripper with two parallel fingers, which hold an object by friction.
+
+    The tool centre point lies between the pads. The fingers close along the y axis of the tool. The distance
+    between the closed fingers is evidence about the class of the object.
+    """
+
+    noun: ClassVar[str] = "grip"
+    needs_yaw: ClassVar[bool] = True
+
+    kind: Literal["fingers"] = "fingers"
+    stroke: Length
+    """Distance between the open fingers [m]."""
+    closed: Distance = 0.0
+    """Distance between the closed fingers [m]."""
+    finger: tuple[Length, Length, Length]
+    """Size of a finger [m]: along the pad (x), along the motion of the fingers (y), and from palm to tip."""
+    tip: Length = 0.01
+    """Distance of the tips beyond the tool centre point [m]."""
+    palm: tuple[Length, Length]
+    """Side lengths of the palm along x and y [m]; the palm reaches up to the flange."""
+    force: Force
+    """Force of each finger on the object [N]."""
+    speed: float = Field(0.1, ge=0.001, le=1)
+    """Speed of each finger [m/s]."""
+    friction: float = Field(1.0, ge=0.05, le=5)
+    """Coefficient of friction of the pads; that of a contact is the product with `friction` of the object."""
+    model: FingerModel | None = None
+    """URDF of the gripper; by default, its links are boxes of the declared sizes. The sizes remain those with
+    which motions are planned, so they enclose the links of the model."""
+    allowance: Length = 0.005
+    """Distance of each open finger from the object before the grasp and after the release [m]."""
+    descent_speed: float = Field(0.25, ge=0.001, le=0.25)
+    """Tool speed while the open fingers move down beside an object [m/s]."""
+    width_tolerance: Length = 0.006
+    """Maximum difference between the distance of the fingers at a grip and the declared width of a class [m],
+    unless the class declares `grip_widths`."""
+
+    @model_validator(mode="after")
+    def _check_sizes(self) -> Fingers:
+        if self.closed >= self.stroke:
+            raise ValueError(f"needs a stroke above the distance of the closed fingers, {self.closed:g} m")
+        if self.finger[2] - self.tip >= self.length:
+            raise ValueError(f"needs fingers that are shorter than its length, {self.length:g} m")
+        return self
+
+    @property
+    def max_opening(self) -> float:
+        """Distance between the open fingers [m]."""
+        return self.stroke
+
+    @property
+    def palm_offset(self) -> float:
+        """Distance from the tool centre point back to the palm [m]."""
+        return self.finger[2] - self.tip
+
+    @property
+    def parts(self) -> tuple[ToolPart, ...]:
+        """The palm; none with a model, which has its own shapes."""
+        return () if self.model else (self._palm_part,)
+
+    @property
+    def _palm_part(self) -> ToolPart:
+        return ToolPart.make_box(self.palm_offset, self.length - self.palm_offset, self.palm)
+
+    def list_parts(self, opening: float) -> Sequence[ToolPart]:
+        """Return palm and fingers; the fingers are fully open at the opening 0."""
+        along_pad, thickness, length = self.finger
+        place = ((opening or self.stroke) + thickness) / 2
+        fingers = (
+            ToolPart.make_box(-self.tip, length, (along_pad, thickness), (0.0, sign * place))
+            for sign in (1, -1)
+        )
+        return (self._palm_part, *fingers)
+
+    def build_links(self) -> str:
+        """Return the links and joints of the model, or boxes with prismatic joints."""
+        if self.model is not None:
+            # The module loads PyBullet in 0.3 s, and only a simulation or a check needs the links.
+            from executive.physics.arm_model import build_attached_links
+
+            return build_attached_links(self.model.urdf, self.model.rotation_deg)
+        along_pad, thickness, length = self.finger
+        template = Template(Path(__file__).with_name("finger.urdf").read_text(encoding="utf-8"))
+        values = {
+            "tool_length": self.length,
+            "size": f"{along_pad} {thickness} {length}",
+            "height": self.tip - length / 2,
+            "max_position": self.stroke / 2,
+            "speed": self.speed,
+            "force": self.force,
+        }
+        return "".join(
+            template.substitute(values, name=name, sign=sign, centre=sign * thickness / 2)
+            for name, sign in zip(FINGER_JOINTS, (1, -1), strict=True)
+        )
+
+    def compute_joint_positions(self, opening: float) -> Mapping[str, float]:
+        """Return the positions at an opening [m]; at the opening 0, the fingers are fully open."""
+        openings = [entry[1] for entry in self.opening_table]
+        order = np.argsort(openings)
+        positions = np.array([entry[0] for entry in self.opening_table])
+        position = float(np.interp(opening or self.stroke, np.array(openings)[order], positions[order]))
+        return {name: factor * position for name, factor in self.couplings.items()}
+
+    @property
+    def opening_table(self) -> tuple[tuple[float, float], ...]:
+        """Positions of the first joint of `couplings`, each with the distance between the fingers [m]."""
+        return self.model.openings if self.model else ((self.stroke / 2, self.stroke), (0.0, 0.0))
+
+    @property
+    def effort(self) -> float:
+        """Maximum force [N] or torque [Nm] of the motor of each joint."""
+        return self.model.effort if self.model else self.force
+
+    @property
+    def couplings(self) -> Mapping[str, float]:
+        """Ratio of the position of each joint of the fingers to that of the first one, by name."""
+        if self.model is None:
+            return dict.fromkeys(FINGER_JOINTS, 1.0)
+        return read_couplings(self.model.urdf, self.model.joint)
+
+    @property
+    def max_holding_force(self) -> float:
+        """Sum of the forces of both fingers [N]."""
+        return 2 * self.force
+
+    def compute_holding_force(self, object_class: ObjectClass, force: float) -> float:
+        """Return the friction of both fingers on an object [N], by Coulomb's law."""
+        return force * self.friction * object_class.friction
+
+    def explain_unsuitable(self, object_class: ObjectClass) -> str:
+        """Return a clause about an object that is too wide or too low, or that slips out of the fingers."""
+        label = object_class.label
+        width = min(width for width, _ in self._list_widths(object_class))
+        if width + 2 * self.allowance > self.stroke:
+            needed = f"{(width + 2 * self.allowance) * 1000:.0f} mm"
+            return f"a {label} needs an opening of {needed}, and the fingers open {self.stroke * 1000:.0f} mm"
+        if width <= self.closed:
+            closed = f"the fingers close to {self.closed * 1000:.0f} mm"
+            return f"a {label} is {width * 1000:.0f} mm wide, and {closed}"
+        if self.get_hold_height(object_class) > object_class.height:
+            return f"a {label} is {object_class.height * 1000:.0f} mm high, too low for the fingers"
+        return ""
+
+    def get_hold_height(self, object_class: ObjectClass) -> float:
+        """Return the height of the pads above the underside of an object [m]: the middle, if possible."""
+        lowest = max(self.tip + MIN_TIP_HEIGHT, object_class.height + PALM_CLEARANCE - self.palm_offset)
+        return max(object_class.grip_height or object_class.height / 2, lowest)
+
+    def compute_release_opening(self, object_class: ObjectClass) -> float:
+        """Return the width of an object, and the allowance on both sides [m]."""
+        width = max(width for width, _ in self._list_widths(object_class))
+        return min(width + 2 * self.allowance, self.stroke)
+
+    def list_grasps(
+        self, object_class: ObjectClass, target: Target, motion: MotionConfig, attempt: GraspAttempt
+    ) -> list[GraspPose]:
+        """Return a grasp of each pair of opposite sides, the narrowest first.
+
+        The open fingers move down on both sides of the object; a contact on the way is a failure. If the
+        angle of an object is unknown, its circle around the outline counts.
+        """
+        x, y, z = map(float, target.pose_at(target.stamp).position)
+        bottom = z - object_class.height / 2
+        end_height = bottom + self.get_hold_height(object_class)
+        clearance = max(motion.descent, motion.margin + TIP_CLEARANCE)
+        start_height = bottom + object_class.height + self.tip + clearance
+        yaw = target.yaw
+        grasps = []
+        widths = self._list_widths(object_class) if yaw else [(2 * object_class.radius, ())]
+        for width, directions in widths:
+            opening = width + 2 * self.allowance + attempt.number * OPENING_STEP
+            yaws: tuple[float, ...] = ()
+            if yaw and directions:
+                # A turned object is wider by the length of its sides times the sine of the angle.
+                opening += 2 * object_class.radius * math.sin(min(TOLERATED_YAW_ERROR * yaw.std, math.pi / 4))
+                yaws = tuple(yaw.angle + direction for direction in directions)
+            goal = Goal(
+                (x, y, end_height),
+                yaws,
+                guarded_length=start_height - end_height,
+                guarded_speed=self.descent_speed,
+            )
+            opening = min(opening, self.stroke)
+            grasps.append(GraspPose(goal, end_height, guard="clear", opening=opening, proves_absence=True))
+        return grasps
+
+    def compute_grip_opening(self, object_class: ObjectClass) -> float:
+        """Return the middle of the smallest range of distances of the fingers at a grip [m]."""
+        return sum(min(self._list_grip_ranges(object_class))) / 2
+
+    def measure_grip(self, object_class: ObjectClass, opening: float) -> ToolMeasurement:
+        """Return a contradiction if the distance of the fingers is that of no grasp of the class.
+
+        Closed fingers have missed the object.
+        """
+        if opening <= self.closed + MIN_GRIP_WIDTH:
+            return ToolMeasurement(is_miss=True)
+        ranges = self._list_grip_ranges(object_class)
+        if any(low <= opening <= high for low, high in ranges):
+            return ToolMeasurement()
+        expected = " or ".join(f"{low * 1000:.0f} to {high * 1000:.0f} mm" for low, high in ranges)
+        message = f"the fingers hold it {opening * 1000:.0f} mm apart, and a {object_class.label} {expected}"
+        return ToolMeasurement(message)
+
+    def find_distinct_labels(self, classes: Mapping[str, ObjectClass]) -> Collection[str]:
+        """Return the classes whose widths at a grip overlap with those of no other class."""
+        ranges = {label: self._list_grip_ranges(object_class) for label, object_class in classes.items()}
+
+        def is_distinct(label: str) -> bool:
+            others = [pair for other, pairs in ranges.items() if other != label for pair in pairs]
+            return not any(
+                low <= other_high and other_low <= high
+                for low, high in ranges[label]
+                for other_low, other_high in others
+            )
+
+        return frozenset(label for label in classes if is_distinct(label))
+
+    def _list_widths(self, object_class: ObjectClass) -> list[tuple[float, tuple[float, ...]]]:
+        """Return the widths of an object between the fingers [m], with the yaws of the tool relative to it.
+
+        The yaws [rad] of a round object are (): every yaw is permitted.
+        """
+        footprint = object_class.footprint
+        if footprint is None or not object_class.yaw_symmetry:
+            return [(2 * object_class.radius, ())]
+        length, width = footprint
+        # The fingers close along y; both directions of the tool are equal.
+        across = (0.0, math.pi)
+        along = (math.pi / 2, -math.pi / 2)
+        if math.isclose(length, width):
+            return [(width, (*across, *along))]
+        pairs: list[tuple[float, tuple[float, ...]]] = sorted([(width, across), (length, along)])
+        return [pair for pair in pairs if pair[0] + 2 * self.allowance <= self.stroke] or pairs[:1]
+
+    def _list_grip_ranges(self, object_class: ObjectClass) -> list[tuple[float, float]]:
+        """Return the smallest and largest distances of the fingers at a grip of an object [m]."""
+        if object_class.grip_widths:
+            return [object_class.grip_widths]
+        tolerance = self.width_tolerance
+        return [(width - tolerance, width + tolerance) for width, _ in self._list_widths(object_class)]
+
+    def build_sim(self, world: World, noise_seed: int = 0) -> SimFingers:
+        """Return the simulated fingers, which hold an object by the friction of the physics engine."""
+        # The module loads PyBullet in 0.3 s; a cell without physics needs no simulated tool.
+        from executive.drivers.sim.fingers import SimFingers
+
+        return SimFingers(world, self, noise_seed)
