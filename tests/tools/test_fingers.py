@@ -1,0 +1,212 @@
+"""Two fingers: grasps, evidence, limits of friction, neighbours, and grips in simulation and rehearsal."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from at_hand import look
+
+from executive.cell.config import CellConfig
+from executive.cell.device_config import STEP, MotionConfig
+from executive.cell.objects import ObjectClass, Target
+from executive.cell.tools import GraspAttempt
+from executive.drivers.sim.fingers import SimFingers
+from executive.drivers.sim.world import World
+from executive.geometry import GRAVITY, Pose, Yaw, rotate_about_z
+from executive.manipulation.grasps import choose_grasp
+from executive.mission.cell_file import load_cell
+from executive.motion.joints import build_kinematics
+from executive.testing.fake_cell import FakeCell
+from executive.testing.faults import during, grip_fails, grip_lost
+from executive.testing.run_mission import run_mission
+from executive.tools.fingers import Fingers
+from tests.motion.joint_states import reach
+
+TOOL = Fingers(
+    length=0.2,
+    stroke=0.11,
+    finger=(0.02, 0.012, 0.09),
+    tip=0.01,
+    palm=(0.05, 0.11),
+    force=20.0,
+    source="test",
+)
+CUBE = ObjectClass("cube", 0.05, 0.0354, footprint=(0.05, 0.05), yaw_symmetry=4, friction=1.0)
+BAR = ObjectClass("bar", 0.03, 0.051, footprint=(0.10, 0.02), yaw_symmetry=2)
+BALL = ObjectClass("ball", 0.07, 0.035)
+MOTION = MotionConfig()
+
+
+@pytest.fixture(scope="module")
+def config(missions: Path) -> CellConfig:
+    return load_cell(missions / "cells" / "iiwa_wsg50.yaml")
+
+
+def list_grasps(object_class: ObjectClass, yaw: Yaw | None, number: int = 0):
+    position = np.array([0.5, 0.1, object_class.height / 2])
+    target = Target("item-1", object_class.label, position, 0.9, 1, 0, 0.0, yaw)
+    return TOOL.list_grasps(object_class, target, MOTION, GraspAttempt(number))
+
+
+@pytest.mark.parametrize(
+    ("object_class", "yaw_counts", "openings"),
+    [(CUBE, [4], [0.06]), (BAR, [2, 2], [0.03, 0.11]), (BALL, [0], [0.08])],
+)
+def test_fingers_close_on_opposite_sides_the_narrowest_first(object_class, yaw_counts, openings) -> None:
+    grasps = list_grasps(object_class, Yaw(0.3, 0.0))
+    assert [len(grasp.goal.yaws) for grasp in grasps] == yaw_counts
+    assert [grasp.opening for grasp in grasps] == pytest.approx(openings)
+    assert {grasp.guard for grasp in grasps} == {"clear"}
+    across = [yaw % math.pi for grasp in grasps[:1] for yaw in grasp.goal.yaws]
+    assert any(yaw == pytest.approx(0.3) for yaw in across) or not across
+
+
+def test_an_uncertain_yaw_a_failed_attempt_and_an_unknown_yaw_open_the_fingers_wider() -> None:
+    openings = [
+        list_grasps(CUBE, Yaw(0.0, std), number)[0].opening for std, number in ((0, 0), (0.05, 0), (0, 1))
+    ]
+    assert openings[1] == pytest.approx(openings[0] + 2 * CUBE.radius * math.sin(0.15))
+    assert openings[2] > openings[0]
+    (grasp,) = list_grasps(CUBE, None)
+    assert (grasp.goal.yaws, grasp.opening) == ((), pytest.approx(2 * CUBE.radius + 0.01))
+
+
+@pytest.mark.parametrize("height", [0.008, 0.05, 0.14])
+def test_tips_stay_above_the_table_and_the_palm_above_the_object(height: float) -> None:
+    hold_height = TOOL.get_hold_height(replace(CUBE, height=height))
+    assert hold_height - TOOL.tip >= 0.003
+    assert hold_height + TOOL.palm_offset >= height + 0.003
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({}, ""),
+        ({"footprint": (0.105, 0.105), "radius": 0.08}, "a cube needs an opening of 115 mm"),
+        ({"height": 0.008}, "a cube is 8 mm high, too low"),
+    ],
+)
+def test_an_object_that_fits_between_no_fingers_is_unsuitable(changes, text) -> None:
+    assert TOOL.explain_unsuitable(replace(CUBE, **changes)).startswith(text)
+    assert bool(TOOL.explain_unsuitable(replace(CUBE, **changes))) is bool(text)
+
+
+@pytest.mark.parametrize(
+    ("opening", "is_contradiction", "is_miss"),
+    [(0.051, False, False), (0.03, True, False), (0.001, False, True)],
+)
+def test_the_width_is_evidence_about_the_class(opening, is_contradiction, is_miss) -> None:
+    measurement = TOOL.measure_grip(CUBE, opening)
+    assert (bool(measurement.contradiction), measurement.is_miss) == (is_contradiction, is_miss)
+
+
+def test_classes_of_different_widths_are_distinct() -> None:
+    classes = {each.label: each for each in (CUBE, BALL, replace(CUBE, label="box", height=0.04))}
+    assert TOOL.find_distinct_labels(classes) == {"ball"}
+
+
+class Bench:
+    """An object between the open fingers, and an arm that is put where it should be."""
+
+    def __init__(self, config: CellConfig, label: str, **changes: float) -> None:
+        tool = config.tool.model_copy(update=changes)
+        self.world = World(config.model_copy(update={"tool": tool}))
+        self.tool: SimFingers = tool.build_sim(self.world)
+        kinematics = build_kinematics(self.world.config)
+        object_class = config.objects[label].build_class(label)
+        self.start = np.array([0.5, 0.05, tool.get_hold_height(object_class)])
+        home = np.radians(config.arm.poses_deg["home"])
+        self.qs = [reach(kinematics, self.start, home)]
+        for height in np.linspace(0.0, 0.1, 240)[1:]:
+            self.qs.append(reach(kinematics, self.start + np.array([0.0, 0.0, height]), self.qs[-1]))
+        self.world.set_joint_positions(self.qs[0])
+        x_axis = self.world.get_tool_pose().rotation[:, 0]
+        rotation = rotate_about_z(math.atan2(x_axis[1], x_axis[0]))
+        X_WO = Pose(rotation, np.array([0.5, 0.05, object_class.height / 2]))
+        self.body = self.world.add_object(label, X_WO, (1, 1, 1))
+        self.steps(60)
+
+    def steps(self, count: int) -> None:
+        for _ in range(count):
+            self.world.command_arm(self.qs[0])
+            self.world.step()
+            self.tool.advance()
+
+    def lift(self) -> None:
+        """Close the fingers, and lift by 0.1 m in a second."""
+        self.tool.close()
+        self.steps(120)
+        for q in self.qs:
+            self.qs[0] = q
+            self.steps(1)
+        self.steps(60)
+
+
+@pytest.mark.parametrize(("label", "width"), [("cube", 0.05), ("sphere", 0.06), ("duck", 0.0403)])
+def test_friction_alone_lifts_an_object_and_its_width_and_weight_are_measured(config, label, width) -> None:
+    bench = Bench(config, label)
+    bench.lift()
+    assert bench.tool.holding
+    assert bench.tool.held_body == bench.body
+    assert bench.tool.opening == pytest.approx(width, abs=0.002)
+    assert bench.tool.load == pytest.approx(0.1 * GRAVITY, abs=0.25)
+    bench.tool.open()
+    bench.steps(60)
+    assert not bench.tool.holding
+    assert bench.tool.opening == pytest.approx(width + 0.01, abs=0.003)
+    assert bench.world.get_object_pose(bench.body).position[2] < 0.04
+
+
+@pytest.mark.parametrize(("factor", "is_held"), [(0.9, False), (1.2, True)])
+def test_an_object_slips_just_below_the_limit_of_friction(config, factor: float, is_held: bool) -> None:
+    # Two fingers with the coefficient 1.0 * 0.5 carry the weight with a force of m g.
+    bench = Bench(config, "sphere", force=factor * 0.1 * GRAVITY)
+    bench.lift()
+    assert bool(bench.world.get_object_pose(bench.body).position[2] > 0.1) is is_held
+
+
+def test_a_loss_is_detected_within_a_tenth_of_a_second(config: CellConfig) -> None:
+    bench = Bench(config, "cube")
+    bench.lift()
+    bench.tool.lose_grip()
+    step_count = 0
+    while bench.tool.holding and step_count < 240:
+        bench.steps(1)
+        step_count += 1
+    # The fingers first close by 48 mm.
+    assert step_count * STEP <= 0.1 + 0.048 / (2 * config.tool.speed)
+    assert bench.tool.dropped_bodies == {bench.body}
+
+
+@pytest.fixture
+def fake_fingers(config: CellConfig) -> FakeCell:
+    fake = FakeCell(config)
+    fake.world.objects.clear()
+    return fake
+
+
+@pytest.mark.parametrize(("gap", "is_blocked"), [(0.05, False), (0.002, True)])
+def test_neighbours_on_all_sides_block_a_grasp_and_are_named(fake_fingers, gap: float, is_blocked) -> None:
+    distance = 2 * fake_fingers.cell.classes["cube"].radius + gap
+    fake_fingers.world.put("cube", 0.5, 0.0)
+    for x, y in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+        fake_fingers.world.put("sphere", 0.5 + x * distance, y * distance)
+    target = next(each for each in look(fake_fingers) if each.label == "cube")
+    if is_blocked:
+        with pytest.raises(Exception, match=r"no space beside cube-1: sphere-\d is in the way"):
+            choose_grasp(fake_fingers.cell, target)
+    else:
+        assert choose_grasp(fake_fingers.cell, target)[0].opening > 0.05
+
+
+def test_a_rehearsal_sorts_with_fingers_and_their_faults_have_their_wording(missions: Path) -> None:
+    faults = [during("*/Grasp", grip_fails(), activations=1), during("*/Transit", grip_lost(), activations=1)]
+    result = run_mission(missions / "sort_overhead.yaml", cell="iiwa_wsg50", faults=faults)
+    messages = [timed.event.message for timed in result.events if getattr(timed.event, "message", "")]
+    assert (result.status, result.agrees) == ("SUCCESS", True)
+    assert any("no grip on" in message for message in messages)
+    assert any("the grip on" in message and "broke on the way" in message for message in messages)
