@@ -19,12 +19,13 @@ MIN_LIFT_HEIGHT = 0.003
 class PutDown(Skill):
     """Put the held item down at the safe place of the cell, or at the nearest free position.
 
-    If the motion is blocked before the item is lifted, the skill releases the item at its position. The skill
-    reads the sensor of the tool during the whole motion.
+    The motion ends with a slow descent, which the contact of the item with the table stops. If the motion is
+    blocked before the item is lifted, the skill releases the item at its position. The skill reads the sensor
+    of the tool during the whole motion.
     """
 
     held: In[Item] = port(refers_to="item", doc="the item in the tool")
-    drop: Metres = param(0.005, ge=0, le=0.05, doc="height of the item's underside above the table")
+    drop: Metres = param(0.005, ge=0, le=0.05, doc="height above the table where the slow descent starts")
     settle: Seconds = param(0.10, ge=0, le=2, doc="time to wait before reading the sensor")
     reasons = ("unreachable", "blocked", "dropped", "stuck")
     uses = ("arm", "tool")

@@ -45,7 +45,8 @@ class MotionGuard(NamedTuple):
     """Events at which an arm stops along the path of its motion, beside collisions.
 
     Attributes:
-        touch: The tool touches something that it did not touch at the start of the motion.
+        touch: The tool touches something that it did not touch at the start of the motion; if it holds an
+            object, this object does, during the guarded descent.
         lost_grip: The tool no longer holds anything.
     """
 

@@ -212,7 +212,7 @@ class FakeArm:
         self._path = [motion.state_at((number + 1) * STEP).q for number in range(step_count)]
         self._half_length = len(self._path) // 2
         self._guard = guard
-        self._has_been_free = not (guard.touch and self.tool.touching)
+        self._has_been_free = not (guard.touch and (self.tool.touching or self._world.is_load_on_table()))
         self.commands.append("start")
         self._world.is_commanded = True
         self.collision = None
@@ -249,7 +249,7 @@ class FakeArm:
             self.stop_after_collision(self.next_obstacle)
             self.next_obstacle = None
         if self._guard.touch and self._path:
-            is_touching = self.tool.touching
+            is_touching = self.tool.touching or self._world.is_load_on_table()
             if self._has_been_free and is_touching:
                 self.stop()
             self._has_been_free |= not is_touching

@@ -77,6 +77,11 @@ class FakeWorld:
             self._roll_to_free_position(fake_object)
         fake_object.rest_positions.append(fake_object.position.copy())
 
+    def is_load_on_table(self) -> bool:
+        """Return True if the held object touches the table."""
+        held = self.held_object
+        return held is not None and float(held.position[2]) <= self.classes[held.label].height / 2
+
     def _roll_to_free_position(self, fake_object: TrueObject) -> None:
         """Move an object off each overlapping object in turn, or from the wall of a bin into the bin."""
         radius = self.classes[fake_object.label].radius

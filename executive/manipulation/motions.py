@@ -190,7 +190,7 @@ def move_to_pose(skill: Skill, cell: Cell, select_pose: Callable[[], str | None]
 def transport(skill: Skill, cell: Cell, item: Item, goal: Goal, goal_name: str) -> Steps:
     """Yield until the arm has moved `item` to `goal`; read the sensor of the tool in every control step.
 
-    `goal_name` is the name of the goal in error messages.
+    A contact of the item ends a guarded descent. `goal_name` is the name of the goal in error messages.
 
     Raises:
         SkillFailed: No motion was found, or the arm collided; the reason is `unreachable` or `blocked`.
@@ -198,7 +198,7 @@ def transport(skill: Skill, cell: Cell, item: Item, goal: Goal, goal_name: str) 
     """
     try:
         motion = yield from plan(skill, cell.arm, lambda: (goal, make_transport_task(cell, item)))
-        guard = MotionGuard(lost_grip=True)
+        guard = MotionGuard(touch=goal.guarded_length > 0, lost_grip=True)
         yield from follow(skill, cell, motion, guard, until=lambda: detect_and_record_drop(cell, item))
     except SkillFailed:
         # `dropped` has priority: handlers of the other reasons expect the item in the tool.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from itertools import product
 
@@ -19,6 +20,8 @@ MAX_ROLL_DISTANCE = 0.002
 """Maximum distance that an object rolls in a bin after its release [m]."""
 DROP_HEIGHT = 0.01
 """Default clearance between an item and the surface below at the release [m]."""
+MAX_PRESSING_DISTANCE = 0.003
+"""Distance by which the descent of a put-down continues below the expected contact with the table [m]."""
 MIN_GAP = 0.02
 """Minimum gap between the object in the tool and other objects after a put-down [m]."""
 GRID_HALF_WIDTH = 2
@@ -188,10 +191,11 @@ def make_slot_goal(
 
 
 def make_put_down_goal(cell: Cell, object_class: ObjectClass, drop_height: float, item: Item | None) -> Goal:
-    """Return the goal of a put-down: an object at `drop_height` [m] above a free position on the table.
+    """Return the goal of a put-down: a guarded descent of an object to a free position on the table.
 
-    The position is the free, reachable candidate nearest to `cell.safe_place`; if none, `cell.safe_place`.
-    `item` is the item in the tool, which is no obstacle; None if the ledger knows no item there.
+    The descent begins `drop_height` [m] above the table. The position is the nearest free and reachable
+    candidate to `cell.safe_place`; if none, `cell.safe_place`. `item` is the item in the tool, which is no
+    obstacle; None if the ledger knows no item there.
     """
     x, y, table_height = map(float, cell.safe_place)
     grid_spacing = 2 * object_class.radius + MIN_GAP
@@ -199,9 +203,18 @@ def make_put_down_goal(cell: Cell, object_class: ObjectClass, drop_height: float
     sorted_offsets = sorted(product(offsets, offsets), key=lambda offset: math.hypot(*offset))
     candidates = ((x + dx, y + dy) for dx, dy in sorted_offsets)
     free_positions = (xy for xy in candidates if _is_free(cell, xy, object_class.radius + MIN_GAP, item))
-    height = table_height + cell.tool_model.get_hold_height(object_class) + drop_height
-    goals = (Goal((*xy, height)) for xy in free_positions)
-    return next((goal for goal in goals if not cell.arm.describe_unreachable(goal)), Goal((x, y, height)))
+    hold_height = cell.tool_model.get_hold_height(object_class)
+    parts = cell.tool_model.list_parts(cell.tool_model.compute_grip_opening(object_class))
+    # The tips of fingers must not press on the table instead of the object.
+    space = hold_height + min(part.offset for part in parts) - cell.motion.margin
+    pressing_distance = min(max(space, 0.0), MAX_PRESSING_DISTANCE)
+    goal = Goal(
+        (x, y, table_height + hold_height - pressing_distance),
+        guarded_length=drop_height + pressing_distance,
+        guarded_speed=cell.motion.descent_speed,
+    )
+    goals = (replace(goal, position=(*xy, goal.position[2])) for xy in free_positions)
+    return next((each for each in goals if not cell.arm.describe_unreachable(each)), goal)
 
 
 def _is_free(cell: Cell, position: tuple[float, float], min_distance: float, item: Item | None) -> bool:

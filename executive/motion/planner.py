@@ -108,6 +108,8 @@ class Planner:
             free_path = downsample_path(free_qs, MAX_CHECK_SPACING)
             self._check_collision(free_path, _treat_target_as_obstacle(task))
             if has_guarded_part:
+                # The load may touch what is below it.
+                task = replace(task, load=None)
                 self._check_collision(downsample_path(qs[len(free_qs) - 1 :], MAX_CHECK_SPACING), task)
 
 
@@ -160,7 +162,8 @@ def plan_straight_motion(
     for attempt in attempts if isinstance(goal, Goal) else [(0.0, 0.0), *attempts]:
         try:
             qs = _find_path(kinematics, start, goal, *attempt)
-            _require_clearance(config, kinematics, np.vstack([start, qs]), task)
+            is_guarded = isinstance(goal, Goal) and goal.guarded_length > 0
+            _require_clearance(config, kinematics, np.vstack([start, qs]), task, is_guarded=is_guarded)
             return StraightMotion(start, qs)
         except (Blocked, Unreachable) as error:
             errors.append(error)
@@ -183,12 +186,16 @@ def _find_path(kinematics: Kinematics, start: Array, goal: Goal | Array, rise: f
     return _interpolate(corners, goal.guarded_length / goal.guarded_speed)
 
 
-def _require_clearance(config: CellConfig, kinematics: Kinematics, qs: Array, task: Task) -> None:
+def _require_clearance(
+    config: CellConfig, kinematics: Kinematics, qs: Array, task: Task, *, is_guarded: bool
+) -> None:
     """Raise Blocked if tool or load come too near to an obstacle at joint positions `(N, n)` [rad]."""
     tcps, axes = kinematics.compute_tcps_and_axes(qs)
     discs = make_tool_discs(config, task.load, task.opening)._replace(min_cosine=-1.0)
-    # Only other objects may be as near as they are at the ends: the goal may not be inside table or bins.
-    for obstacles, min_margin in (((), 0.0), (task.obstacles, -math.inf)):
+    # Only other objects may be as near as they are at the ends: the goal may not be inside table or bins,
+    # except that of a load at the end of a guarded descent, which ends at the contact.
+    min_fixed_margin = -math.inf if task.load and is_guarded else 0.0
+    for obstacles, min_margin in (((), min_fixed_margin), (task.obstacles, -math.inf)):
         clearance = ClearanceModel(config, obstacles, tcps[[0, -1], :2], discs)
         clearance.relax_end_margins(tcps[[0, -1]], axes[[0, -1]], min_margin)
         clearance.require_clearance(tcps, axes)

@@ -30,11 +30,15 @@ class ContactMonitor:
     Args:
         world: The world of the arm.
         tool: The tool, which may hold a body.
+
+    Attributes:
+        is_load_touching: True if `find_new_contact` has found a permitted contact of the load.
     """
 
     def __init__(self, world: World, tool: SimTool) -> None:
         self._world = world
         self._tool = tool
+        self.is_load_touching = False
         self._last_contact_steps: dict[tuple[str, int], int] = {}
         """Physics step of the last contact of each ignored pair of a robot part and a body."""
 
@@ -43,15 +47,21 @@ class ContactMonitor:
         step = self._world.step_count
         self._last_contact_steps = {(part, body): step for part, body, _, _ in self._iterate_contacts()}
 
-    def find_new_contact(self, tip_may_touch: bool) -> tuple[str, Sequence[float] | None]:
-        """Return description and point [m] of a new forbidden contact; without one, "" and None."""
+    def find_new_contact(self, may_touch: bool) -> tuple[str, Sequence[float] | None]:
+        """Return description and point [m] of a new forbidden contact; without one, "" and None.
+
+        `may_touch` permits contacts of the tip of the tool and of the load.
+        """
+        self.is_load_touching = False
         now = self._world.step_count
         oldest = now - SEPARATION_STEP_COUNT
         self._last_contact_steps = {k: step for k, step in self._last_contact_steps.items() if step >= oldest}
         for part, body, position, force in self._iterate_contacts():
             if (part, body) in self._last_contact_steps:
                 self._last_contact_steps[part, body] = now
-            elif force > MIN_CONTACT_FORCE and not (tip_may_touch and self._is_tip(part, position)):
+            elif force > MIN_CONTACT_FORCE and may_touch and part == name_load("object"):
+                self.is_load_touching = True
+            elif force > MIN_CONTACT_FORCE and not (may_touch and self._is_tip(part, position)):
                 name = self._world.name_body(body)
                 place = format_point(self._world.get_tool_pose().position)
                 return f"{part} ran into {name}, with the tool at {place}", position
@@ -189,12 +199,14 @@ class SimArm:
         if self._braking_times is None:
             self._check_guard()
         if self._braking_times is None:
-            tip_may_touch = self._guard.touch and self.motion_time >= motion.guarded_start_time
-            message, self.contact_point = self._contact_monitor.find_new_contact(tip_may_touch)
+            may_touch = self._guard.touch and self.motion_time >= motion.guarded_start_time
+            message, self.contact_point = self._contact_monitor.find_new_contact(may_touch)
             if not message and np.abs(self.q - self.commanded_q).max() > TRACKING_TOLERANCE:
                 message = self._describe_disturbance(TRACKING_TOLERANCE)
             if message:
                 self.stop_after_collision(message)
+            elif self._contact_monitor.is_load_touching:
+                self.stop()
         if self._braking_times is None:
             self.motion_time += STEP
             has_ended = self.motion_time >= motion.duration
@@ -213,7 +225,7 @@ class SimArm:
         """Begin to brake at an event of the guard."""
         if self._guard.lost_grip and not self._tool.holding:
             self.stop()
-        elif self._guard.touch:
+        elif self._guard.touch and self._tool.held_body is None:
             is_touching = self._tool.touching
             if self._has_been_free and is_touching:
                 self.stop()

@@ -9,7 +9,7 @@ import pybullet
 import pytest
 from rig import Rig
 
-from executive.cell.arm import Goal, Task
+from executive.cell.arm import Goal, MotionGuard, Task
 from executive.cell.objects import Obstacle
 from executive.geometry import Array
 from executive.motion.trajectory import RETREAT_TIME, Trajectory
@@ -65,13 +65,27 @@ def test_an_object_in_the_way_of_the_tool_makes_the_arm_brake_along_its_path(rig
     assert rig.arm.tool_pose.position == pytest.approx(RIGHT.position, abs=1e-4)
 
 
-def test_what_the_held_object_runs_into_counts_but_neither_the_tool_nor_the_table_it_lay_on(rig: Rig) -> None:
+def hold_cube(rig: Rig) -> Task:
+    """Pick a cube; return the task of motions with it."""
     held = rig.add("cube", 0.5, 0.1)
     rig.step(60)
     rig.touch_down(Goal((0.5, 0.1, 0.045), guarded_length=0.012, guarded_speed=0.035))
     rig.tool.close()
     assert rig.tool.held_body == held
-    task = Task(rig.config.objects["cube"].build_class("cube"), rig.tool.holding_force)
+    return Task(rig.config.objects["cube"].build_class("cube"), rig.tool.holding_force)
+
+
+def test_a_load_that_touches_the_table_ends_a_guarded_descent_without_a_collision(rig: Rig) -> None:
+    task = hold_cube(rig)
+    goal = Goal((0.5, -0.1, 0.045), guarded_length=0.01, guarded_speed=0.035)
+    rig.arm.start(rig.planned(goal, task), MotionGuard(touch=True, lost_grip=True))
+    rig.run()
+    assert (rig.arm.collision, rig.tool.holding) == (None, True)
+    assert rig.arm.tool_pose.position == pytest.approx([0.5, -0.1, 0.05], abs=1.5e-3)
+
+
+def test_what_the_held_object_runs_into_counts_but_neither_the_tool_nor_the_table_it_lay_on(rig: Rig) -> None:
+    task = hold_cube(rig)
     rig.go(LEFT, task)
     assert rig.arm.collision is None
     motion = rig.planned(RIGHT, task)
