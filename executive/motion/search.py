@@ -89,7 +89,12 @@ class MotionSearch:
         payload = None
         if task.load is not None:
             payload = PayloadLimit(task.load, task.holding_force, config.tool, kinematics)
-        self._departure = departure = self._plan_departure(start, float(tcps[0, 2]), payload)
+        # Upper layers in a bin are higher than its walls, and open fingers leave them straight, too.
+        has_fingers_in_bin = task.opening > 0 and any(
+            bin.contains(tcps[0]) for bin in config.build_bins().values()
+        )
+        max_height = math.inf if has_fingers_in_bin else self._travel_height
+        self._departure = departure = self._plan_departure(start, max_height - float(tcps[0, 2]), payload)
         free_start = departure.state_at(departure.duration) if departure else JointState.at_rest(start)
         self.problem = MotionProblem(free_start, Connector(self._limits), kinematics, clearance, payload)
         # The motion up to a via point is the same for all candidates, and is planned once per height.
@@ -264,15 +269,16 @@ class MotionSearch:
         return JointState.at_rest(q)
 
     def _plan_departure(
-        self, start: Array, height: float, payload: PayloadLimit | None
+        self, start: Array, max_length: float, payload: PayloadLimit | None
     ) -> CartesianLine | None:
         """Return the straight motion upwards from the start, or None if the free part begins at the start.
 
         The cell file may require a straight departure. If the grip of a load permits less acceleration than
         the joints, the load also departs straight, because contact with the support could break the grip.
+        There is none if it would be longer than `max_length` [m].
         """
         length = self._straight_part_length or (LIFT_OFF_DISTANCE if payload else 0.0)
-        if not length or height + length > self._travel_height:
+        if not length or length > max_length:
             return None
         waypoints = find_vertical_waypoints(self._kinematics, start, length)
         if waypoints is None:

@@ -78,6 +78,16 @@ def test_a_fixed_question_gets_a_fixed_answer(planner, config, home, name: str) 
     assert motion.samples.q.mean(axis=0) == pytest.approx(mean, abs=2e-4)
 
 
+def test_open_fingers_leave_an_upper_layer_of_a_bin_straight(config: CellConfig, home: Array) -> None:
+    motion = config.motion.model_copy(update={"straight": 0.05})
+    planner = Planner(config.model_copy(update={"motion": motion}))
+    start = planner.plan(home, replace(BIN, position=(0.24, -0.44, 0.12))).end
+    tips = tips_of(planner, planner.plan(start, pick(0.5, -0.1), Task(opening=0.06)))
+    rise = tips[: np.argmax(tips[:, 2] > 0.165)]
+    assert len(rise) > 10
+    assert rise[:, :2] == pytest.approx(np.tile([0.24, -0.44], (len(rise), 1)), abs=1e-3)
+
+
 @given(on_the_table, st.floats(0.008, 0.03), st.floats(0.02, 0.08))
 @settings(max_examples=10)
 def test_the_guarded_part_is_straight_even_and_no_faster_than_asked(
