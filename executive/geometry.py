@@ -132,3 +132,8 @@ def make_tool_down_pose(position: ArrayLike, yaw: float = 0.0) -> Pose:
     joints 3 and 5 are at zero has this orientation if joints 1 and 7 have equal angles.
     """
     return Pose(rotate_about_z(yaw) @ np.diag([-1.0, 1.0, -1.0]), np.asarray(position, dtype=float))
+
+
+def compute_tool_yaw(X_WT: Pose) -> float:
+    """Return the `yaw` [rad] of `make_tool_down_pose` with which a tool that points down has a pose."""
+    return math.atan2(-X_WT.rotation[0, 1], X_WT.rotation[1, 1])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from executive.cell.objects import Item
 from executive.cell.protocols import Cell, Steps
+from executive.errors import Blocked
 from executive.manipulation.grasps import make_bin_goal
 from executive.manipulation.motions import transport, verify_grasp
 from executive.manipulation.tool_goals import DROP_HEIGHT, explain_uncertain_bin
@@ -22,7 +23,8 @@ class Transit(Skill):
 
     The skill fails with `blocked` if the bin depends on the weight of the item, and no weighing made the
     class of the item certain, and with `bin_missing` if images contradict the declared place or colour of
-    the bin.
+    the bin. It also fails with `blocked` if the bin has a `place_yaw_deg`, and no image showed the yaw of the
+    item before the grasp, or open fingers would hit something at this yaw.
     """
 
     held: In[Item] = port(refers_to="item", doc="the item in the tool")
@@ -40,6 +42,10 @@ class Transit(Skill):
             raise self.failure("bin_missing", contradiction)
         if doubt := explain_uncertain_bin(cell, self.bin, self.held):
             raise self.failure("blocked", doubt)
-        goal = make_bin_goal(cell, self.bin, self.held, self.drop)
+        try:
+            held_yaw = cell.ledger.get_held_yaw(self.held)
+            goal = make_bin_goal(cell, self.bin, self.held, held_yaw, self.drop)
+        except Blocked as error:
+            raise self.failure("blocked", str(error)) from error
         yield from transport(self, cell, self.held, goal, self.bin)
         yield from verify_grasp(self, cell, self.held, goal)

@@ -155,6 +155,14 @@ class BinConfig(Section):
     """Numbers of drop positions along x and along y."""
     colour: Colour = (0.6, 0.6, 0.6)
     """Colour of the walls."""
+    place_yaw_deg: Angle | tuple[Angle, ...] | None = None
+    """Angle of the objects in the bin, from the x axis of the world towards its y axis [degree]: one for all
+    slots, or a list with one for each slot, in the order of their use (along y first). An object with a
+    `yaw_symmetry` of 1 or 2 lies with the part of its outline that `yaw_offset_deg` names, its longer axis or
+    the narrower end of it, in this direction, and any other object with the x axis of its model, up to its
+    symmetry. A round object may lie at any angle. If not given, every object may. `Transit` brings no other
+    object into such a bin if its yaw is unknown. A layer of objects is as high as the tallest class that is
+    routed to the bin."""
 
     def build_bin(self, name: str) -> Bin:
         """Return the declared bin, with slots evenly distributed over the floor."""
@@ -162,7 +170,20 @@ class BinConfig(Section):
         size = np.array(self.size)
         slot_indices = np.array([*np.ndindex(self.slots)])
         slots = position[:2] + size[:2] * ((slot_indices + 0.5) / self.slots - 0.5)
-        return Bin(name, position, size, slots, self.colour)
+        angles = self.place_yaw_deg
+        if angles is None:
+            angles = ()
+        elif not isinstance(angles, tuple):
+            angles = (angles,) * len(slots)
+        return Bin(name, position, size, slots, self.colour, tuple(map(math.radians, angles)))
+
+    @model_validator(mode="after")
+    def _check_place_yaws(self) -> BinConfig:
+        slot_count = math.prod(self.slots)
+        if isinstance(self.place_yaw_deg, tuple) and len(self.place_yaw_deg) != slot_count:
+            count = len(self.place_yaw_deg)
+            raise ValueError(f"needs one place_yaw_deg for each of its {slot_count} slots, not {count}")
+        return self
 
 
 class TableConfig(Section):
@@ -293,6 +314,11 @@ class CellConfig(Section):
     """Thresholds of the ledger, which tracks the objects."""
     safe_place: Vector
     """Position on the table at which `PutDown` puts down an object: x, y, z [m]."""
+
+    @property
+    def needs_yaw(self) -> bool:
+        """True if images must show the yaws of objects, for the grasps of the tool or for a bin."""
+        return self.tool.needs_yaw or any(bin.place_yaw_deg is not None for bin in self.bins.values())
 
     @property
     def max_object_height(self) -> float:

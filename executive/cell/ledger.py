@@ -9,7 +9,7 @@ from typing import Protocol
 from executive.cell.frame import BinAppearance, Detections, Frame, Observation, Region
 from executive.cell.objects import Item, KnownItem, Target
 from executive.cell.tools import ToolMeasurement
-from executive.geometry import Array
+from executive.geometry import Array, Yaw
 
 
 class Presence(Enum):
@@ -199,8 +199,13 @@ class Ledger(Protocol):
         `found_table` is True if the descent to the item touched nothing above the table.
         """
 
-    def record_grasp(self, item: Item) -> None:
+    def get_held_yaw(self, item: Item) -> Yaw | None:
+        """Return the yaw of an item relative to the tool at its last grasp; None if it is unknown."""
+
+    def record_grasp(self, item: Item, held_yaw: Yaw | None = None) -> None:
         """Record that the tool holds an item; the grasp may have moved neighbouring objects.
+
+        `held_yaw` is the yaw of the item relative to the tool; None if it is unknown.
 
         Raises:
             Fault: According to the ledger, the tool still holds another item.

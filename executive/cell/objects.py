@@ -196,6 +196,8 @@ class Bin:
         size: Inner length, width and wall height `(3,)` [m].
         slots: Drop positions over the floor `(N, 2)` [m], in the order of their use.
         colour: Red, green and blue of the walls, each 0 to 1.
+        place_yaws: Angle of the object in each slot [rad], see `BinConfig.place_yaw_deg`; (): every angle is
+            permitted.
     """
 
     name: str
@@ -203,6 +205,7 @@ class Bin:
     size: Array
     slots: Array
     colour: tuple[float, float, float] = (0.6, 0.6, 0.6)
+    place_yaws: tuple[float, ...] = ()
 
     @cached_property
     def walls(self) -> Sequence[tuple[Array, Array]]:

@@ -15,7 +15,7 @@ from executive.cell.arm import Goal
 from executive.cell.device_config import Length, MotionConfig, Section
 from executive.cell.objects import ObjectClass, Target
 from executive.errors import InputError
-from executive.geometry import Array
+from executive.geometry import Array, Yaw
 from executive.plugins import list_entries
 
 TOOL_GROUP = "executive.tools"
@@ -232,6 +232,15 @@ class ToolModel(Section):
             attempt: The attempt, which may have another grasp than the attempts before.
         """
         raise NotImplementedError(f"{type(self).__name__} does not define `list_grasps`")
+
+    def compute_held_yaw(self, yaw: Yaw, tool_yaw: float) -> Yaw:
+        """Return the yaw of a held object relative to the tool; the default is that before the grasp.
+
+        Args:
+            yaw: Measured yaw of the object before the grasp.
+            tool_yaw: Yaw of the tool at the grasp [rad], as in `Goal.yaws`.
+        """
+        return yaw._replace(angle=yaw.angle - tool_yaw)
 
     def measure_contact(
         self,

@@ -123,7 +123,7 @@ class FakeCamera:
         self._matrix, self._X_MC = compute_calibration(self._config)
         # T is the frame of the tool, F the frame of the flange.
         self._X_TF = Pose.of((0.0, 0.0, -config.tool.length))
-        self._shows_outlines = config.tool.needs_yaw
+        self._shows_outlines = config.needs_yaw
         self._world = world
         self._arm = arm
         self._clock = clock

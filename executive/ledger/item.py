@@ -86,6 +86,7 @@ class ItemRecord:
         confidence: Confidence of the last detection, 0 to 1.
         yaw: Mean of the angles measured since the last possible move of the item; None if it is unknown.
         yaw_weight: Sum of the inverse variances of these angles [1/rad²].
+        held_yaw: Yaw relative to the tool at the last grasp; None if it is unknown.
         state: State of the item.
         bin: Name of the bin that contains the item, or "".
         reason: Reason of the state, or "".
@@ -126,6 +127,7 @@ class ItemRecord:
     confidence: float = 0.0
     yaw: Yaw | None = None
     yaw_weight: float = 0.0
+    held_yaw: Yaw | None = None
     state: State = State.SEEN
     bin: str = ""
     reason: str = ""

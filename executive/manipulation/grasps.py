@@ -13,12 +13,13 @@ from executive.cell.objects import Item, Obstacle, Target
 from executive.cell.protocols import Cell
 from executive.cell.tools import CONTACT_SPACING, OVERTRAVEL, GraspAttempt, GraspPose, ToolPart
 from executive.errors import Blocked, Fault
-from executive.geometry import Array
+from executive.geometry import Array, Yaw, compute_tool_yaw
 from executive.manipulation.tool_goals import (
     DROP_HEIGHT,
     list_obstacles,
     make_bin_goal_at_any_yaw,
     make_obstacle,
+    predict_next_slot_index,
 )
 
 YAW_COUNT = 24
@@ -76,15 +77,53 @@ def has_free_grasp(cell: Cell, target: Target) -> bool:
     return True
 
 
-def make_bin_goal(cell: Cell, bin_name: str, item: Item, drop_height: float = DROP_HEIGHT) -> Goal:
+def measure_held_yaw(cell: Cell, target: Target) -> Yaw | None:
+    """Return the yaw of a target relative to the tool that grips it; None if it is unknown or not needed."""
+    # The border records each read of the tool pose, so it is read only if a bin needs it.
+    if target.yaw is None or not any(bin.place_yaws for bin in cell.bins.values()):
+        return None
+    held_yaw = cell.tool_model.compute_held_yaw(target.yaw, compute_tool_yaw(cell.arm.tool_pose))
+    # The goal remains that of the plan ahead although the arm trembles.
+    return held_yaw._replace(angle=round(held_yaw.angle, 3))
+
+
+def make_bin_goal(
+    cell: Cell, bin_name: str, item: Item, held_yaw: Yaw | None, drop_height: float = DROP_HEIGHT
+) -> Goal:
     """Return the tool goal at which `item` is `drop_height` [m] above the next slot of a bin.
 
-    Fingers that open there do not hit walls or objects, if there is such a yaw.
+    Fingers that open there do not hit walls or objects, if there is such a yaw. `held_yaw` is the yaw of the
+    item relative to the tool.
+
+    Raises:
+        Blocked: The bin needs the yaw of the item, which is unknown, or the fingers would hit something at
+            each permitted yaw; the message names it.
     """
-    goal = make_bin_goal_at_any_yaw(cell, bin_name, item, drop_height)
-    opening = cell.tool_model.compute_release_opening(cell.classes[cell.ledger.get_label(item)])
-    yaws, _ = find_free_yaws(cell, goal, opening, list_obstacles(cell, item))
-    return replace(goal, yaws=yaws or ())
+    object_class = cell.classes[cell.ledger.get_label(item)]
+    yaws = _list_place_yaws(cell, bin_name, item, held_yaw)
+    goal = replace(make_bin_goal_at_any_yaw(cell, bin_name, item, drop_height), yaws=yaws)
+    opening = cell.tool_model.compute_release_opening(object_class)
+    free_yaws, blocker = find_free_yaws(cell, goal, opening, list_obstacles(cell, item))
+    if free_yaws is None and yaws:
+        raise Blocked(f"the fingers cannot open at the yaw that {bin_name} needs: {blocker} is in the way")
+    return replace(goal, yaws=free_yaws or ())
+
+
+def _list_place_yaws(cell: Cell, bin_name: str, item: Item, held_yaw: Yaw | None) -> tuple[float, ...]:
+    """Return the yaws of the tool [rad] at which `item` has the yaw of the next slot; () for every yaw."""
+    place_yaws = cell.bins[bin_name].place_yaws
+    object_class = cell.classes[cell.ledger.get_label(item)]
+    symmetry = object_class.yaw_symmetry
+    if not place_yaws or not symmetry:
+        return ()
+    place_yaw = place_yaws[predict_next_slot_index(cell, bin_name, item) % len(place_yaws)]
+    # The two ends of an object without symmetry may look alike in an image.
+    if held_yaw is None or held_yaw.symmetry != symmetry:
+        needed = f"{bin_name} needs {item} at {math.degrees(place_yaw):g} degrees"
+        raise Blocked(f"{needed}, but no image showed the yaw of {item}; put {item} down and look again")
+    direction = object_class.yaw_offset if symmetry <= 2 else 0.0
+    first = place_yaw - direction - held_yaw.angle
+    return tuple(math.remainder(first + math.tau * index / symmetry, math.tau) for index in range(symmetry))
 
 
 def find_free_yaws(

@@ -82,6 +82,22 @@ def find_max_object_height(cell: Cell) -> float:
     return max(object_class.height for object_class in cell.classes.values())
 
 
+def find_layer_thickness(cell: Cell, bin_name: str) -> float:
+    """Return the thickness of a layer of objects in a bin [m]: the height of the tallest class.
+
+    In a bin with `place_yaw_deg`, only the classes count that are routed to the bin or lie in it, so that the
+    parts of a layer stand on those below.
+    """
+    if not cell.bins[bin_name].place_yaws:
+        return find_max_object_height(cell)
+    heights = [
+        object_class.height
+        for label, object_class in cell.classes.items()
+        if bin_name in cell.routes.get(label, ()) or cell.ledger.count_objects_in(bin_name, label)
+    ]
+    return max(heights, default=find_max_object_height(cell))
+
+
 def compute_layer_height(bin: Bin, layer: int, max_object_height: float) -> float:
     """Return the height of the underside of a layer of objects in a bin [m]; layer 0 lies on the floor."""
     return float(bin.position[2]) + BIN_THICKNESS + layer * max_object_height
@@ -104,7 +120,7 @@ def _list_bin_obstacles(cell: Cell, excluded_item: Item | None) -> Iterator[Obst
         for index, (x, y) in enumerate(bin.slots[:next_slot_index]):
             # Objects fill the slots of a layer in order, before the next layer begins.
             layer_count = math.ceil((next_slot_index - index) / len(bin.slots))
-            top = compute_layer_height(bin, layer_count, find_max_object_height(cell))
+            top = compute_layer_height(bin, layer_count, find_layer_thickness(cell, bin_name))
             yield Obstacle(float(x), float(y), radius, top, f"the objects in slot {index + 1} of {bin_name}")
 
 
@@ -169,8 +185,8 @@ def make_bin_goal_at_any_yaw(cell: Cell, bin_name: str, item: Item, drop_height:
     """Return the tool goal at which `item` is `drop_height` [m] above the next slot of a bin."""
     next_slot_index = predict_next_slot_index(cell, bin_name, item)
     hold_height = cell.tool_model.get_hold_height(cell.classes[cell.ledger.get_label(item)])
-    max_height = find_max_object_height(cell)
-    return make_slot_goal(cell.bins[bin_name], next_slot_index, hold_height, max_height, drop_height)
+    thickness = find_layer_thickness(cell, bin_name)
+    return make_slot_goal(cell.bins[bin_name], next_slot_index, hold_height, thickness, drop_height)
 
 
 def make_slot_goal(
@@ -182,7 +198,7 @@ def make_slot_goal(
         bin: The bin.
         slot_index: Index of the next slot; a new layer begins after the last slot of the bin.
         hold_height: Distance from the tool centre point down to the underside of the object [m].
-        max_object_height: Height of the tallest class of objects, and thickness of each layer [m].
+        max_object_height: Height of the tallest object in the bin, and thickness of each layer [m].
         drop_height: Height of the object's underside above the layer below, or above the floor [m].
     """
     layer, index_in_layer = divmod(slot_index, len(bin.slots))

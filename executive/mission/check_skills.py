@@ -259,7 +259,10 @@ def check_loads(
 
 
 def check_slots(cell: CellFile, config: CellConfig, mission: Mission) -> Iterator[Finding]:
-    """Yield an error for each class and bin of a route if walls or objects beside a slot block transits."""
+    """Yield an error for each class and bin of a route if walls or objects beside a slot block transits.
+
+    A bin with `place_yaw_deg` needs classes whose yaws images show.
+    """
     # `list_obstacles` represents each object in a bin by a cylinder for the largest class.
     obstacle_radius = max(section.radius for section in config.objects.values()) + MAX_ROLL_DISTANCE
     for label, name in [(label, name) for label, bins in mission.routes.items() for name in bins]:
@@ -267,6 +270,10 @@ def check_slots(cell: CellFile, config: CellConfig, mission: Mission) -> Iterato
         section = config.objects.get(label)
         if bin is None or section is None:
             continue  # `routes.check_names` reports the name
+        if bin.place_yaw_deg is not None and section.footprint is None and section.yaw_symmetry is None:
+            message = f"images show no yaw of a {label} without a footprint, and {name} has a place_yaw_deg"
+            hint = "Give the class a footprint, or yaw_symmetry: 0 if it is round."
+            yield make_error(cell.find_span(("objects", label), at_key=True), "layout", message, hint)
         radius = section.radius + section.ring + config.motion.margin
         for axis, size, count in zip("xy", bin.size, bin.slots, strict=False):
             min_size = radius + max(radius, obstacle_radius if count > 1 else 0.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 import traceback
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 
 from py_trees.common import Status
@@ -15,11 +15,11 @@ from executive import events
 from executive.cell.devices import sleep_on
 from executive.cell.objects import Item
 from executive.cell.protocols import Cell, Steps
-from executive.errors import Fault, Interrupted, Stopped, describe_error
+from executive.errors import Blocked, Fault, Interrupted, Stopped, describe_error
 from executive.events import Event, Observer, RunEnded, RunStarted, TimedEvent
 from executive.ledger.final_states import is_balanced
 from executive.ledger.tracker import Tracker
-from executive.manipulation.grasps import choose_grasp, has_free_grasp, make_bin_goal
+from executive.manipulation.grasps import choose_grasp, has_free_grasp, make_bin_goal, measure_held_yaw
 from executive.manipulation.motions import make_transport_task
 from executive.manipulation.tool_goals import sort_by_tour, sort_pickable_targets
 from executive.processes import shorten_collections
@@ -416,7 +416,12 @@ class LookaheadPlanner:
         if may_hold and self._item_and_bin and cell.tool.holding:
             self._grip_tick = None
             item, bin = self._item_and_bin
-            cell.arm.plan_ahead(make_bin_goal(cell, bin, item), make_transport_task(cell, item))
+            # `Transit` reports a yaw that is unknown or impossible.
+            with suppress(Blocked):
+                target = next((each for each in cell.ledger.find_targets() if each.item == item), None)
+                held_yaw = measure_held_yaw(cell, target) if target else None
+                goal = make_bin_goal(cell, bin, item, held_yaw)
+                cell.arm.plan_ahead(goal, make_transport_task(cell, item))
         elif self._change_tick not in (None, tick) and self._held_item and self._is_moving_to_bin():
             self._change_tick = None
             pickable_targets = sort_pickable_targets(cell, cell.ledger.find_targets())

@@ -205,7 +205,7 @@ class Station:
             )
             method = "plane" if is_without_physics else config.localization
             localizer = CellLocalizer(
-                method, classes, tuple(bins.values()), cast_ray, measures_yaw=config.tool.needs_yaw
+                method, classes, tuple(bins.values()), cast_ray, measures_yaw=config.needs_yaw
             )
             self.cell = Cell(
                 clock=clock,

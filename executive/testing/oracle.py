@@ -157,9 +157,9 @@ class TruthCamera(SimCamera):
         )
 
     def _make_detection(self, outline: _Outline) -> Detection:
-        """Return the true detection of an object; with its convex outline if the tool needs the yaw."""
+        """Return the true detection of an object; with its convex outline if the cell needs the yaw."""
         detection = Detection(outline.label, 1.0, compute_bounding_box(outline.pixels))
-        if not self._world.config.tool.needs_yaw:
+        if not self._world.config.needs_yaw:
             return detection
         hull = cv2.convexHull(outline.pixels.astype(np.float32)).reshape(-1, 2)
         return replace(detection, outline=tuple((x, y) for x, y in hull.tolist()))

@@ -16,6 +16,7 @@ from executive.cell.arm import Goal
 from executive.cell.device_config import Angles, Distance, Force, Length, MotionConfig, Section
 from executive.cell.objects import ObjectClass, Target
 from executive.cell.tools import GraspAttempt, GraspPose, ToolMeasurement, ToolModel, ToolPart
+from executive.geometry import Yaw
 
 if TYPE_CHECKING:
     from executive.drivers.sim.fingers import SimFingers
@@ -240,6 +241,12 @@ class Fingers(ToolModel):
             opening = min(opening, self.stroke)
             grasps.append(GraspPose(goal, end_height, guard="clear", opening=opening, proves_absence=True))
         return grasps
+
+    def compute_held_yaw(self, yaw: Yaw, tool_yaw: float) -> Yaw:
+        """Return the yaw of an object whose sides the fingers have turned parallel to the pads."""
+        held_yaw = super().compute_held_yaw(yaw, tool_yaw)
+        quarter_turn = math.pi / 2
+        return held_yaw._replace(angle=round(held_yaw.angle / quarter_turn) * quarter_turn)
 
     def compute_grip_opening(self, object_class: ObjectClass) -> float:
         """Return the middle of the smallest range of distances of the fingers at a grip [m]."""

@@ -156,8 +156,8 @@ def test_what_hangs_over_a_bin_counts_as_let_go_there_but_for_its_own_way(
     first, second = fake.cell.bins["red_bin"].slots[:2]
     assert (predict_object_count(fake.cell, "red_bin"), predict_object_count(fake.cell, "blue_bin")) == (1, 0)
     assert predict_object_count(fake.cell, "red_bin", "cube-1") == 0
-    assert np.allclose(make_bin_goal(fake.cell, "red_bin", "cube-1").position[:2], first)
-    assert np.allclose(make_bin_goal(fake.cell, "red_bin", "duck-1").position[:2], second)
+    assert np.allclose(make_bin_goal(fake.cell, "red_bin", "cube-1", None).position[:2], first)
+    assert np.allclose(make_bin_goal(fake.cell, "red_bin", "duck-1", None).position[:2], second)
     before = list_obstacles(fake.cell)
     run_skill(Release(held="cube-1", bin="red_bin"), fake)
     assert list_obstacles(fake.cell) == before
