@@ -48,10 +48,12 @@ class MotionGuard(NamedTuple):
         touch: The tool touches something that it did not touch at the start of the motion; if it holds an
             object, this object does, during the guarded descent.
         lost_grip: The tool no longer holds anything.
+        push_force: Maximum force of a contact of the tool in the guarded part that is no collision [N].
     """
 
     touch: bool = False
     lost_grip: bool = False
+    push_force: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -62,11 +64,12 @@ class Goal:
         position: Position of the tool centre point `(x, y, z)` [m].
         yaws: Permitted rotations of the tool about the vertical axis [rad]; the planner chooses the fastest.
             If empty, every rotation is permitted.
-        guarded_length: Length of the guarded descent [m]; 0: no guarded descent. The guarded descent is the
-            end of the motion, during which the tool may touch the target.
-        guarded_speed: Maximum tool speed of the slow end of the guarded descent [m/s].
-        fast_length: Length of the beginning of the guarded descent, in which the arm still brakes [m]; the
-            remaining, slow end is vertical.
+        guarded_length: Length of the guarded part, usually a descent [m]; 0: no guarded part. It is the end
+            of the motion, during which the tool may touch the target.
+        guarded_speed: Maximum tool speed of the slow end of the guarded part [m/s].
+        fast_length: Length of the beginning of a guarded descent, in which the arm still brakes [m]; the
+            remaining, slow end is straight.
+        direction: Unit vector of the straight end of the motion; by default straight down.
     """
 
     position: tuple[float, float, float]
@@ -74,11 +77,17 @@ class Goal:
     guarded_length: float = 0.0
     guarded_speed: float = math.inf
     fast_length: float = 0.0
+    direction: tuple[float, float, float] = (0.0, 0.0, -1.0)
 
     @property
     def slow_length(self) -> float:
-        """Length of the slow, vertical end of the motion [m]."""
+        """Length of the slow, straight end of the motion [m]."""
         return self.guarded_length - self.fast_length
+
+    def compute_line_start(self, length: float) -> tuple[float, float, float]:
+        """Return the position [m] from which a straight line of a length [m] leads to the goal."""
+        x, y, z = (end - length * part for end, part in zip(self.position, self.direction, strict=True))
+        return x, y, z
 
 
 @dataclass(frozen=True)

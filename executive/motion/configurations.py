@@ -34,7 +34,9 @@ COARSE_ANGLE_STEP = math.radians(5.0)
 FINE_ANGLE_STEP = math.radians(0.25)
 """Distance between the redundancy angles in the second search, if the first search finds nothing [rad]."""
 WAYPOINT_COUNT = 4
-"""Number of waypoints on a vertical line."""
+"""Number of waypoints on a straight line."""
+UP = (0.0, 0.0, 1.0)
+"""Unit vector of a vertical line upwards."""
 MIN_COSINE_ON_LINE = 0.9998
 """Minimum cosine between the tool axis and straight down at the start of a vertical line."""
 _MAX_SOLUTION_ERROR = 1e-6  # [rad]
@@ -66,7 +68,7 @@ class ConfigurationPairs:
 def find_configuration_pairs(
     kinematics: Kinematics, goal: Goal, length: float, q_start: Array
 ) -> ConfigurationPairs:
-    """Return all pairs of configurations in the joint range at a goal and `length` [m] above the goal.
+    """Return all pairs of configurations in the joint range at a goal and `length` [m] before the goal.
 
     There is a pair for each permitted yaw of the goal. If every yaw is permitted, the last joint turns as
     little as possible from `q_start` `(n,)` [rad].
@@ -74,8 +76,7 @@ def find_configuration_pairs(
     Raises:
         Unreachable: No pair is in the joint range; the message states the position and the cause.
     """
-    x, y, z = goal.position
-    poses = [make_tool_down_pose((x, y, z + length)), make_tool_down_pose((x, y, z))]
+    poses = [make_tool_down_pose(goal.compute_line_start(length)), make_tool_down_pose(goal.position)]
     direction = _find_turn_direction(kinematics, q_start)
     yaws: list[float | None] = [direction * yaw for yaw in goal.yaws] or [None]
     searches = [(COARSE_ANGLE_STEP, PREFERRED_LIMIT_DISTANCE), (FINE_ANGLE_STEP, 0.0)]
@@ -112,23 +113,28 @@ def find_vertical_waypoints(kinematics: Kinematics, q: Array, length: float) -> 
     return waypoints if is_inside and np.max(np.abs(waypoints[0] - q)) < _MAX_SOLUTION_ERROR else None
 
 
-def solve_vertical_waypoints(kinematics: Kinematics, q: Array, length: float, branch: BranchKey) -> Array:
-    """Return evenly spaced waypoints `(WAYPOINT_COUNT, n)` [rad] on a vertical line, in one branch.
+def solve_straight_waypoints(
+    kinematics: Kinematics, q: Array, length: float, branch: BranchKey, direction: Sequence[float] = UP
+) -> Array:
+    """Return evenly spaced waypoints `(WAYPOINT_COUNT, n)` [rad] on a straight line, in one branch.
 
-    The line of `length` [m] leads upwards from `q` `(n,)` [rad]; tool axis and joint range are not checked.
+    The line of `length` [m] leads from `q` `(n,)` [rad] along the unit vector `direction`. Tool axis and
+    joint range are not checked.
 
     Raises:
         Unreachable: A point of the line is too far from the arm or too near to the arm.
     """
-    waypoints = _solve_waypoints(kinematics, kinematics.compute_tool_pose(q), length, branch)
+    waypoints = _solve_waypoints(kinematics, kinematics.compute_tool_pose(q), length, branch, direction)
     # The waypoints may be whole turns away from `q`.
     turns = np.round((q - waypoints[0]) / math.tau)
     return waypoints + wrap_angles(q - waypoints[0]) + math.tau * turns
 
 
-def _solve_waypoints(kinematics: Kinematics, X_WT: Pose, length: float, branch: BranchKey) -> Array:
-    """Return continuous waypoints `(WAYPOINT_COUNT, n)` [rad] on a vertical line upwards from `X_WT`."""
-    positions = X_WT.position + np.outer(np.linspace(0.0, length, WAYPOINT_COUNT), [0.0, 0.0, 1.0])
+def _solve_waypoints(
+    kinematics: Kinematics, X_WT: Pose, length: float, branch: BranchKey, direction: Sequence[float] = UP
+) -> Array:
+    """Return continuous waypoints `(WAYPOINT_COUNT, n)` [rad] on a line from `X_WT` along a unit vector."""
+    positions = X_WT.position + np.outer(np.linspace(0.0, length, WAYPOINT_COUNT), np.array(direction))
     waypoints = kinematics.solve([Pose(X_WT.rotation, position) for position in positions], branch)
     waypoints[1:] = waypoints[0] + wrap_angles(waypoints[1:] - waypoints[0])
     return waypoints
@@ -330,7 +336,7 @@ class Candidate:
     Attributes:
         min_duration: Minimum duration of the free part [s].
         free_part_end: Joint state at the end of the free part.
-        arrival: Straight motion of the tool downwards from `free_part_end`, or None.
+        arrival: Straight motion of the tool from `free_part_end`, or None.
         branch: Branch of the inverse kinematics at the end, or None for given joint positions.
     """
 
@@ -367,7 +373,8 @@ def find_candidates(
         arrival = None
         free_part_end = JointState.at_rest(goal_q)
         if length > 0:
-            waypoints = solve_vertical_waypoints(kinematics, goal_q, length, branch)[::-1]
+            back = [-part for part in goal.direction]
+            waypoints = solve_straight_waypoints(kinematics, goal_q, length, branch, back)[::-1]
             arrival = CartesianLine(waypoints, length, limits, goal.guarded_speed, starts_in_motion=True)
             free_part_end = arrival.state_at(0.0)
         yield Candidate(float(durations[index]), free_part_end, arrival, branch)

@@ -24,7 +24,7 @@ from executive.motion.clearance_model import ClearanceModel, make_tool_discs
 from executive.motion.configurations import (
     find_configuration_pairs,
     find_vertical_waypoints,
-    solve_vertical_waypoints,
+    solve_straight_waypoints,
 )
 from executive.motion.joints import JointLimits, Kinematics, build_planning_kinematics
 from executive.motion.optimizer import MotionProblem
@@ -179,9 +179,9 @@ def _find_path(kinematics: Kinematics, start: Array, goal: Goal | Array, rise: f
     pairs = find_configuration_pairs(kinematics, goal, goal.guarded_length, start)
     # The largest change of a joint would be smaller with another norm, but the tool would sink more.
     nearest = np.argmin(np.linalg.norm(pairs.upper_qs - corners[-1], axis=1))
-    length = max(0.0, height - goal.position[2] - goal.guarded_length)
+    length = max(0.0, height - goal.compute_line_start(goal.guarded_length)[2])
     branch = pairs.branches[nearest]
-    descent = solve_vertical_waypoints(kinematics, pairs.upper_qs[nearest], length, branch)
+    descent = solve_straight_waypoints(kinematics, pairs.upper_qs[nearest], length, branch)
     corners = np.vstack([corners, descent[::-1], pairs.lower_qs[nearest]])
     return _interpolate(corners, goal.guarded_length / goal.guarded_speed)
 

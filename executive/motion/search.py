@@ -22,7 +22,7 @@ from executive.motion.configurations import (
     CartesianLine,
     find_candidates,
     find_vertical_waypoints,
-    solve_vertical_waypoints,
+    solve_straight_waypoints,
 )
 from executive.motion.joints import BranchKey, JointLimits, Kinematics
 from executive.motion.optimizer import MotionProblem, Optimizer, PayloadLimit
@@ -76,8 +76,8 @@ class MotionSearch:
         discs = make_tool_discs(config, task.load, task.opening)
         start_tcp_and_axis = kinematics.compute_tcps_and_axes(start[None])
         if isinstance(end, Goal):
-            x, y, z = end.position
-            end_tcp_and_axis = (np.array([[x, y, z + end.slow_length]]), np.array([[0.0, 0.0, -1.0]]))
+            line_start = end.compute_line_start(end.slow_length)
+            end_tcp_and_axis = (np.array([line_start]), np.array([[0.0, 0.0, -1.0]]))
         else:
             end_tcp_and_axis = kinematics.compute_tcps_and_axes(end[None])
             if task.load is None:
@@ -232,7 +232,7 @@ class MotionSearch:
         if candidate.branch is None or z >= height:
             return [*rise, connect(start_via_point, end)]
         if prefers_lines and candidate.arrival is None:
-            waypoints = solve_vertical_waypoints(self._kinematics, end.q, height - z, candidate.branch)
+            waypoints = solve_straight_waypoints(self._kinematics, end.q, height - z, candidate.branch)
             descent = CartesianLine(waypoints[::-1], height - z, self._limits)
             return [*rise, connect(start_via_point, JointState.at_rest(waypoints[-1])), descent]
         goal_via_point = self._solve_via_point((x, y, height), candidate.branch, end.q)

@@ -11,7 +11,7 @@ from joint_states import ARM, LIMITS, SOONER, passed, peaks, tool_velocities
 
 from executive.cell.arm import Goal
 from executive.geometry import Array
-from executive.motion.configurations import CartesianLine, find_configuration_pairs, solve_vertical_waypoints
+from executive.motion.configurations import CartesianLine, find_configuration_pairs, solve_straight_waypoints
 
 
 class Descent(NamedTuple):
@@ -30,7 +30,7 @@ def descents(draw: st.DrawFn) -> Descent:
     postures = find_configuration_pairs(ARM, Goal(place), length, np.zeros(7))
     number = draw(st.integers(0, len(postures.lower_qs) - 1))
     branch = postures.branches[number]
-    chain = solve_vertical_waypoints(ARM, postures.lower_qs[number], length, branch)[::-1]
+    chain = solve_straight_waypoints(ARM, postures.lower_qs[number], length, branch)[::-1]
     return Descent(chain, length, draw(st.sampled_from([0.03, 0.2, math.inf])))
 
 

@@ -47,11 +47,8 @@ class ContactMonitor:
         step = self._world.step_count
         self._last_contact_steps = {(part, body): step for part, body, _, _ in self._iterate_contacts()}
 
-    def find_new_contact(self, may_touch: bool) -> tuple[str, Sequence[float] | None]:
-        """Return description and point [m] of a new forbidden contact; without one, "" and None.
-
-        `may_touch` permits contacts of the tip of the tool and of the load.
-        """
+    def find_new_contact(self, guard: MotionGuard) -> tuple[str, Sequence[float] | None]:
+        """Return description and point [m] of a new contact that `guard` forbids; if none, "" and None."""
         self.is_load_touching = False
         now = self._world.step_count
         oldest = now - SEPARATION_STEP_COUNT
@@ -59,19 +56,21 @@ class ContactMonitor:
         for part, body, position, force in self._iterate_contacts():
             if (part, body) in self._last_contact_steps:
                 self._last_contact_steps[part, body] = now
-            elif force > MIN_CONTACT_FORCE and may_touch and part == name_load("object"):
+            elif force > MIN_CONTACT_FORCE and guard.touch and part == name_load("object"):
                 self.is_load_touching = True
-            elif force > MIN_CONTACT_FORCE and not (may_touch and self._is_tip(part, position)):
+            elif force > MIN_CONTACT_FORCE and not self._is_permitted(guard, part, position, force):
                 name = self._world.name_body(body)
                 place = format_point(self._world.get_tool_pose().position)
                 return f"{part} ran into {name}, with the tool at {place}", position
         return "", None
 
-    def _is_tip(self, part: str, position: Sequence[float]) -> bool:
-        """Return True if a point in the world [m] on a part of the robot is on the tip of the tool."""
+    def _is_permitted(self, guard: MotionGuard, part: str, position: Sequence[float], force: float) -> bool:
+        """Return True if a guard permits a force [N] on a part of the robot at a point in the world [m]."""
+        if part != self._world.name_link(self._world.tool_index):
+            return False
         X_TW = self._world.get_tool_pose().inverse()
-        is_tool = part == self._world.name_link(self._world.tool_index)
-        return is_tool and bool(X_TW.apply(position)[2] > -self._world.config.tool.tip_length)
+        is_tip = bool(X_TW.apply(position)[2] > -self._world.config.tool.tip_length)
+        return (guard.touch and is_tip) or force <= guard.push_force
 
     def _iterate_contacts(self) -> Iterator[tuple[str, int, Sequence[float], float]]:
         """Yield part of the robot, touched body, contact point [m] and normal force [N] of each contact."""
@@ -199,8 +198,8 @@ class SimArm:
         if self._braking_times is None:
             self._check_guard()
         if self._braking_times is None:
-            may_touch = self._guard.touch and self.motion_time >= motion.guarded_start_time
-            message, self.contact_point = self._contact_monitor.find_new_contact(may_touch)
+            guard = self._guard if self.motion_time >= motion.guarded_start_time else MotionGuard()
+            message, self.contact_point = self._contact_monitor.find_new_contact(guard)
             if not message and np.abs(self.q - self.commanded_q).max() > TRACKING_TOLERANCE:
                 message = self._describe_disturbance(TRACKING_TOLERANCE)
             if message:
