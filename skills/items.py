@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from executive.cell.objects import Item
 from executive.cell.protocols import Cell
+from executive.manipulation.grasps import explain_blocked_grasp
 from executive.skill import In, Out, Skill, param, port
 
 MIN_DROPS_OF_HEAVY_OBJECT = 3
@@ -87,6 +88,9 @@ class RejectTarget(Skill):
         if known.attempts < self.after:
             return
         reason = f"{self.why} ({known.attempts} failed attempts)" if known.attempts else self.why
+        targets = {target.item: target for target in cell.ledger.find_targets()}
+        if self.item in targets and (blocker := explain_blocked_grasp(cell, targets[self.item])):
+            reason += f": {blocker}"
         if known.drops >= MIN_DROPS_OF_HEAVY_OBJECT:
             reason += f"; too heavy for the tool, or slippery: the tool dropped it {known.drops} times"
         cell.ledger.reject(self.item, reason)

@@ -6,7 +6,7 @@ import math
 
 from executive.cell.objects import Item, Target
 from executive.cell.protocols import Cell
-from executive.manipulation.grasps import has_free_grasp
+from executive.manipulation.grasps import explain_blocked_grasp
 from executive.manipulation.tool_goals import choose_bin, sort_by_tour, sort_pickable_targets
 from executive.perception.evidence import describe_unknown_labels
 from executive.skill import In, Out, Skill, SkillFailed, param, port
@@ -73,11 +73,11 @@ class SelectTarget(Skill):
     def _make_sort_key(self, cell: Cell, target: Target) -> tuple[float | str, ...]:
         """Return the sort key of a candidate; the smallest key comes first."""
         known = cell.ledger.describe(target.item)
+        is_blocked = bool(explain_blocked_grasp(cell, target))
         if self.prefer == "surest":
-            is_blocked = not has_free_grasp(cell, target)
             return known.deferral_rank, is_blocked, -target.confidence, target.item
         attempts = known.attempts if self.prefer == "least_tried" else 0
-        return known.deferral_rank, not has_free_grasp(cell, target), attempts
+        return known.deferral_rank, is_blocked, attempts
 
     def _is_permitted(self, cell: Cell, item: Item) -> bool:
         """Return True if a bin for an item is free, and `same`, `among` and `not` permit the item."""

@@ -66,15 +66,14 @@ def choose_grasp(
     raise Blocked(f"the open fingers have no space beside {target.item}: {blocker} is in the way")
 
 
-def has_free_grasp(cell: Cell, target: Target) -> bool:
-    """Return True if neither neighbours nor bin walls block every grasp of a target."""
-    if not cell.tool_model.max_opening:
-        return True
-    try:
-        choose_grasp(cell, target)
-    except Blocked:
-        return False
-    return True
+def explain_blocked_grasp(cell: Cell, target: Target) -> str:
+    """Return the sentence that names a neighbour or a wall if they block every grasp of a target, else ""."""
+    if cell.tool_model.max_opening:
+        try:
+            choose_grasp(cell, target)
+        except Blocked as error:
+            return str(error)
+    return ""
 
 
 def measure_held_yaw(cell: Cell, target: Target) -> Yaw | None:
