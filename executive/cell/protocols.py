@@ -224,6 +224,7 @@ class Cell:
         classes: Known properties of each class of objects, by label.
         routes: Names of the permitted bins by class label, from the mission.
         localizer: The localizer, which computes the positions of detected objects.
+        workspace: Smallest and largest corner of the part of the table where objects lie `(2, 2)` [m].
         safe_place: Position on the table for putting down a held object `(3,)` [m].
         tool_model: Grasps, measurements and limits of the tool.
         motion: Heights and speed of guarded motions.
@@ -245,6 +246,7 @@ class Cell:
     classes: Mapping[str, ObjectClass]
     routes: Routes
     localizer: Localizer
+    workspace: Array
     safe_place: Array
     tool_model: ToolModel
     motion: MotionConfig

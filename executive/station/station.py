@@ -222,6 +222,7 @@ class Station:
                 classes=MappingProxyType(classes),
                 routes=MappingProxyType(self.routes),
                 localizer=self.border.wrap("localizer", localizer),
+                workspace=np.array([config.table.x, config.table.y]).T,
                 safe_place=np.array(config.safe_place),
                 tool_model=config.tool,
                 motion=config.motion,
