@@ -251,12 +251,7 @@ def _run_in_this_process(
     driver_options = {"scene": str(scene)} if scene else {}
     options = RunOptions(seed, make_cell=make_cell, driver_options=driver_options)
     result = record_run(loaded, options, runs, RecordOptions(saves_pictures=False))
-    events = (timed.event for timed in read_journal(Path(result.run) / "journal.jsonl"))
-    reports = {
-        event.item: Report(event.label, event.state, event.reason, event.bin)
-        for event in events
-        if isinstance(event, ItemChanged)
-    }
+    reports = read_reports(Path(result.run))
     objects = tuple(
         replace(one, reports=tuple(reports[item] for item in one.items if item in reports))
         for one in cells[0].objects
@@ -265,3 +260,13 @@ def _run_in_this_process(
         mission, seed, result.status, result.message, objects, result.robot_time_s, result.run,
         tuple(reports.values()), len(getattr(result, "unexplained", ())),
     )  # fmt: skip
+
+
+def read_reports(run: Path) -> dict[str, Report]:
+    """Return what the journal of a run directory says last about each item."""
+    events = (timed.event for timed in read_journal(run / "journal.jsonl"))
+    return {
+        event.item: Report(event.label, event.state, event.reason, event.bin)
+        for event in events
+        if isinstance(event, ItemChanged)
+    }

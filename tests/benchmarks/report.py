@@ -24,6 +24,7 @@ from executive.campaign.evaluation import load_cells
 from executive.campaign.jobs import MissionUnderTest, load_mission_under_test
 from executive.cell.json_values import to_json
 from executive.cli.shared import (
+    cell_option,
     json_option,
     keep_stdout_clean,
     mission_argument,
@@ -49,7 +50,7 @@ TABLE_WIDTH = 160
 T = TypeVar("T")
 
 SHARED_OPTIONS: dict[str, tuple[Option, ...]] = {
-    "subject": (mission_argument, oracle_option, seed_option, overrides_option),
+    "subject": (mission_argument, cell_option, oracle_option, seed_option, overrides_option),
     "cell": (click.argument("cell", default="overhead"),),
     "folders": (
         click.argument("folders", nargs=-1, required=True, type=click.Path(exists=True, path_type=Path)),
@@ -90,11 +91,11 @@ def run_command(measure: Callable[..., Figures]) -> None:
     """
 
     def command(as_json: bool, **values: Any) -> None:
-        if "cell" in values:
-            (values["cell"],) = load_cells((values["cell"],)).values()
         if "mission" in values:
-            names = ("mission", "overrides", "oracle", "seed")
+            names = ("mission", "overrides", "oracle", "seed", "cell")
             values["subject"] = load_mission_under_test(*[values.pop(name) for name in names])
+        elif "cell" in values:
+            (values["cell"],) = load_cells((values["cell"],)).values()
         with keep_stdout_clean():
             figures = measure(**values)
         if as_json:

@@ -27,6 +27,7 @@ from tests.benchmarks import (
     kinematics,
     longest_step,
     mutations,
+    rows,
     soak,
     suction_map,
     tick,
@@ -134,6 +135,23 @@ def test_yaws_in_rendered_images_are_measured() -> None:
     figures = yaw.measure(load_cell(find_cell("overhead")), images=4, seed=1, true_boxes=True)
     assert figures["problems"] == []
     assert {row["class"]: row["within 4 std %"] for row in figures["classes"]} == {"cube": 100, "duck": 100}
+
+
+def load_row(**overrides: str) -> MissionUnderTest:
+    return load_mission_under_test("sort_overhead", overrides, has_oracle=True, seed=1, cell="iiwa_wsg50")
+
+
+def test_rows_of_objects_are_sorted(tmp_path: Path) -> None:
+    figures = rows.measure(load_row(), tmp_path, workers=1, rows=1, objects=2, gap_mm=8)
+    assert (figures["problems"], figures["gaps"][0]["placed"]) == ([], 2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("deferrals", "placed", "named"), [(1, 3, 3), (4, 6, 0)])
+def test_objects_that_block_each_other_are_named_or_pushed(tmp_path, deferrals, placed, named) -> None:
+    figures = rows.measure(load_row(deferrals=str(deferrals)), tmp_path, workers=1, rows=1, gap_mm=0)
+    (row,) = figures["gaps"]
+    assert (row["placed"], row["neighbour named"]) == (placed, named)
 
 
 def test_the_shipped_map_is_what_the_code_measures() -> None:
