@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, NamedTuple
 
+import numpy as np
 from pydantic import Field, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
@@ -54,6 +56,15 @@ class ToolPart:
         """Return a part that is a box; the arguments are as the attributes."""
         corner = [abs(place) + side / 2 for place, side in zip(centre, sides, strict=True)]
         return ToolPart(offset, length, math.hypot(*corner), sides, centre)
+
+    def list_corners(self) -> Array:
+        """Return the corners `(8, 3)` of a box in the frame of the tool [m]; of a cylinder, none."""
+        if self.sides is None:
+            return np.zeros((0, 3))
+        ranges = [
+            (place - side / 2, place + side / 2) for place, side in zip(self.centre, self.sides, strict=True)
+        ]
+        return np.array(list(itertools.product(*ranges, (-self.offset - self.length, -self.offset))))
 
 
 @dataclass(frozen=True)

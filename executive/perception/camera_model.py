@@ -25,6 +25,9 @@ FAR_PLANE = 5.0
 
 MAX_CENTRE_ERROR = 0.2
 """Maximum distance of the principal point from the centre of the image, as a fraction of half the image."""
+MIN_DEPTH = 0.05
+"""Minimum distance of a drawn point of the arm from the camera along the optical axis [m]; the link that
+carries a wrist camera is nearer."""
 BORDER_FRACTION = 0.05
 """Width of the ignored border of an image with a partial view, as a fraction of the height of the image.
 
@@ -114,6 +117,20 @@ def project(matrix: Array, X_WC: Pose, points: ArrayLike) -> Array:
     """
     p = X_WC.inverse().apply(points) @ matrix.T
     return np.asarray(p[..., :2] / p[..., 2:])
+
+
+def draw_hull(mask: NDArray[np.uint8], points: Array, matrix: Array, X_WC: Pose) -> None:
+    """Set the pixels of an image mask `(H, W)` inside the convex hull of world points `(N, 3)` [m].
+
+    Points behind the camera are left out. `matrix` is the camera matrix `(3, 3)` [pixel].
+    """
+    max_coordinate = 4 * max(mask.shape)  # OpenCV cannot draw polygons with very large coordinates.
+    x, y, depth = matrix @ X_WC.inverse().apply(points).T
+    is_in_front = depth > MIN_DEPTH
+    pixels = np.stack([x, y], axis=1)[is_in_front] / depth[is_in_front, None]
+    if len(pixels) > 2:
+        corners = pixels.clip(-max_coordinate, max_coordinate).round().astype(np.int32)
+        cv2.fillConvexPoly(mask, cv2.convexHull(corners), 1)
 
 
 def compute_hull_mask(

@@ -11,7 +11,6 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 from xml.sax.saxutils import escape
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -32,6 +31,7 @@ from executive.cell.device_config import Angles
 from executive.cell.tools import ToolPart
 from executive.errors import InputError
 from executive.geometry import Array, Pose, rotate_about_z
+from executive.perception.camera_model import draw_hull
 from executive.physics.model_files import check_files, convert_model, find_mesh, is_shipped, read_shape
 from executive.text.findings import suggest_choice
 from executive.text.validate import KeyPath
@@ -59,9 +59,6 @@ HULL_MARGIN = 0.01
 """Distance between a link and its hull [m], for cables, hoses and the error of the camera pose."""
 DIRECTION_COUNT = 240
 """Number of directions in which a hull touches its link."""
-MIN_DEPTH = 0.05
-"""Minimum distance of a visible point of the arm from the camera along the optical axis [m]; the link that
-carries a wrist camera is nearer."""
 
 
 def build_arm_urdf(config: CellConfig, *, visuals: bool) -> str:
@@ -219,15 +216,8 @@ class ArmHulls:
 
         `matrix` is the camera matrix `(3, 3)` [pixel].
         """
-        max_coordinate = 4 * max(mask.shape)  # OpenCV cannot draw polygons with very large coordinates.
-        X_CW = X_WC.inverse()
         for points in self.compute_points(q):
-            x, y, depth = matrix @ X_CW.apply(points).T
-            is_in_front = depth > MIN_DEPTH
-            pixels = np.stack([x, y], axis=1)[is_in_front] / depth[is_in_front, None]
-            if len(pixels) > 2:
-                corners = pixels.clip(-max_coordinate, max_coordinate).round().astype(np.int32)
-                cv2.fillConvexPoly(mask, cv2.convexHull(corners), 1)
+            draw_hull(mask, points, matrix, X_WC)
 
 
 @lru_cache(maxsize=8)

@@ -23,7 +23,12 @@ from executive.geometry import Array, Pose
 from executive.motion.joints import Kinematics
 from executive.perception.bin_check import inspect_bins
 from executive.perception.camera_check import describe_displacement, describe_standstill
-from executive.perception.camera_model import BORDER_FRACTION, compute_calibration, compute_hull_mask
+from executive.perception.camera_model import (
+    BORDER_FRACTION,
+    compute_calibration,
+    compute_hull_mask,
+    draw_hull,
+)
 from executive.perception.witness import find_unexplained
 
 if TYPE_CHECKING:
@@ -99,6 +104,11 @@ class CellCamera:
         self._X_TF = Pose.of((0.0, 0.0, -config.tool.length))
         self._size = (self.config.width, self.config.height)
         self._hulls = _load_hulls(config) if is_hidden_by_arm else None
+        self._tool_corners: list[Array] = []
+        """Corners `(N, 3)` of the palm, and of both fingers, in the frame of the tool [m]."""
+        if opening := config.tool.max_opening:
+            palm, *fingers = (part.list_corners() for part in config.tool.list_parts(opening))
+            self._tool_corners = [palm, np.concatenate(fingers)]
         self._load_radius = max(section.radius for section in config.objects.values()) + MAX_LOAD_OFFSET
         self._load_height = config.max_hold_height
         heights = (0.0, config.max_pile_height)
@@ -225,6 +235,8 @@ class CellCamera:
                     if abs(column) <= 4 * width and abs(row) <= 4 * height:
                         size = max(1, round(self.matrix[0, 0] * radius / z))
                         cv2.circle(occluded, (column, row), size, 1, -1)
+        for corners in map(X_WT.apply, self._tool_corners):
+            draw_hull(occluded, corners, self.matrix, X_WC)
         return occluded == 0
 
 

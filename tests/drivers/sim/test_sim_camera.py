@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,6 +16,7 @@ from executive.drivers.sim.camera import CELL_LIGHT, SimCamera, add_depth_noise,
 from executive.drivers.sim.models import load_mesh
 from executive.drivers.sim.world import World
 from executive.geometry import Pose, rotate_about_z
+from executive.mission.cell_file import load_cell
 from executive.motion.joints import build_kinematics
 from executive.perception.camera_model import compute_calibration, project
 from executive.station.camera import CellCamera, Robot
@@ -139,3 +141,16 @@ def test_the_scan_poses_of_the_wrist_camera_show_the_floors_of_all_bins(
     camera = CellCamera(wrist, device, robot, robot, build_kinematics(wrist))
     appearances = camera.inspect_bins(camera.capture())
     assert appearances == dict.fromkeys(wrist.bins, BinAppearance("", 0.0, is_whole=True))
+
+
+def test_the_palm_of_a_wide_hand_is_not_visible(build: Build, missions: Path) -> None:
+    config = load_cell(missions / "cells" / "panda_hand.yaml")
+    world = build(config)
+    q = np.radians(config.arm.poses_deg["home"])
+    still: Any = SimpleNamespace(q=q, holding=False)
+    robot = Robot(still, still)
+    device = SimCamera(world, config, StepClock(step=1.5), 0, CELL_LIGHT)
+    frame = CellCamera(config, device, robot, robot, build_kinematics(config)).capture()
+    ends = world.get_tool_pose().apply(np.array([(0.0, -0.1, -0.05), (0.0, 0.1, -0.05)]))
+    columns, rows = project(frame.matrix, frame.X_WC, ends).round().astype(int).T
+    assert not frame.visible[rows, columns].any()
