@@ -26,9 +26,9 @@ from executive.motion.joints import BranchKey, JointLimits, JointRange, Kinemati
 
 PREFERRED_LIMIT_DISTANCE = math.radians(1.0)
 """Preferred minimum distance of joint positions from their limits [rad]."""
-LIMIT_DISTANCE_OF_YAWS = math.radians(10.0)
-"""Preferred minimum distance of joint positions from their limits [rad] if the yaw is fixed: the last joint
-may move towards its limit in the straight departure, and must then stop."""
+LIMIT_DISTANCE_OF_YAWS = math.radians(25.0)
+"""Preferred minimum distance of the last joint from its limits [rad] if yaws are given: the joint may move
+towards its limit in the straight departure, and must then stop."""
 COARSE_ANGLE_STEP = math.radians(5.0)
 """Distance between the redundancy angles in the first search for configurations [rad]."""
 FINE_ANGLE_STEP = math.radians(0.25)
@@ -79,9 +79,10 @@ def find_configuration_pairs(
     poses = [make_tool_down_pose(goal.compute_line_start(length)), make_tool_down_pose(goal.position)]
     direction = _find_turn_direction(kinematics, q_start)
     yaws: list[float | None] = [direction * yaw for yaw in goal.yaws] or [None]
-    searches = [(COARSE_ANGLE_STEP, PREFERRED_LIMIT_DISTANCE), (FINE_ANGLE_STEP, 0.0)]
+    preferred = np.full(len(q_start), PREFERRED_LIMIT_DISTANCE)
+    searches = [(COARSE_ANGLE_STEP, preferred), (FINE_ANGLE_STEP, 0.0 * preferred)]
     if goal.yaws:
-        searches.insert(0, (COARSE_ANGLE_STEP, LIMIT_DISTANCE_OF_YAWS))
+        searches.insert(0, (COARSE_ANGLE_STEP, np.append(preferred[:-1], LIMIT_DISTANCE_OF_YAWS)))
     for angle_step, margin in searches:
         (upper_qs, lower_qs), branches = kinematics.solve_all(poses, q_start, angle_step)
         joint_range = kinematics.joint_range.shrink(margin)

@@ -36,8 +36,8 @@ class JointRange(NamedTuple):
     lower: Array
     upper: Array
 
-    def shrink(self, margin: float) -> JointRange:
-        """Return the range reduced by `margin` [rad] at both ends of every joint."""
+    def shrink(self, margin: float | Array) -> JointRange:
+        """Return the range reduced at both ends by `margin` [rad], a number or one for each joint `(n,)`."""
         return JointRange(self.lower + margin, self.upper - margin)
 
     def contains(self, qs: Array) -> NDArray[np.bool_]:

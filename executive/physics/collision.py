@@ -32,6 +32,8 @@ from executive.physics.cell_world import (
 
 ROUNDING_ERROR = 1e-5
 """Maximum rounding error of a distance [m]."""
+START_TOLERANCE = 1e-4
+"""Distance by which a part may come closer than at the start [m]; lines of the tool deviate by 0.02 mm."""
 SEARCH_DISTANCE = 0.1
 """Distances that exceed the margin by more than this value are not computed [m]."""
 MAX_CYLINDER_COUNT = 300
@@ -152,7 +154,8 @@ class ClearanceChecker:
                 start_distances = {key: approach.distance for key, approach in closest.items()}
             start_distances = {key: start_distances[key] for key in closest if key in start_distances}
             for key, approach in closest.items():
-                min_distance = min(approach.min_distance, start_distances.get(key, math.inf))
+                start_distance = start_distances.get(key, math.inf) - START_TOLERANCE
+                min_distance = min(approach.min_distance, start_distance)
                 if approach.distance < min_distance - ROUNDING_ERROR:
                     place = format_point(self.world.get_tool_pose().position)
                     message = f"the motion would bring {approach}, with the tool at {place}; "
