@@ -16,9 +16,8 @@ MAX_FALSE_GRASPS = 3
 class Grasp(Skill):
     """Close the tool on the target and verify the grasp.
 
-    The skill succeeds if the tool's sensor reports an object after the settling time `settle`. It fails with
-    `sensor_implausible` if this sensor cannot be right. It also waits until fingers are at rest; if their
-    distance contradicts the class of the target, the skill opens them and fails with `missed`.
+    The skill succeeds if the tool's sensor reports an object after the time `settle`; fingers must then rest
+    as far apart as for the class. It fails with `sensor_implausible` if this sensor cannot be right.
     """
 
     target: In[Target] = port(doc="the target that the tool touches")

@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from executive.cell.arm import Goal, Task
-from executive.cell.objects import Item, Obstacle, Target
+from executive.cell.objects import Bin, Item, Obstacle, Target
 from executive.cell.protocols import Cell
-from executive.cell.tools import CONTACT_SPACING, OVERTRAVEL, GraspAttempt, GraspPose, ToolPart
+from executive.cell.tools import (
+    CONTACT_SPACING,
+    OVERTRAVEL,
+    GraspAttempt,
+    GraspPose,
+    ToolModel,
+    ToolPart,
+)
 from executive.errors import Blocked, Fault
 from executive.geometry import Array, Yaw, compute_tool_yaw
 from executive.manipulation.tool_goals import (
@@ -26,7 +33,7 @@ YAW_COUNT = 24
 """Number of yaws that are tried if every yaw is permitted."""
 POINT_SPACING = 0.004
 """Maximum distance between the points that represent the base of a part of the tool [m]."""
-SAFETY_DISTANCE = 0.002
+SAFETY_DISTANCE = 0.001
 """Distance in addition to the margin of the cell file [m], so that the planner does not need the last
 millimetre."""
 
@@ -56,9 +63,11 @@ def choose_grasp(
     if not grasps:
         raise Fault(f'the tool "{cell.tool_model.kind}" lists no grasp of a {target.label}')
     obstacles = list_obstacles(cell, target.item)
+    bins = cell.bins.values()
+    margin = cell.motion.margin
     blocker = ""
     for grasp in grasps:
-        yaws, name = find_free_yaws(cell, grasp.goal, grasp.opening, obstacles)
+        yaws, name = find_free_yaws(cell.tool_model, grasp.opening, grasp.goal, obstacles, bins, margin)
         blocker = blocker or name
         if yaws is not None:
             task = Task(obstacles=obstacles, target=make_obstacle(cell, target), opening=grasp.opening)
@@ -102,7 +111,9 @@ def make_bin_goal(
     yaws = _list_place_yaws(cell, bin_name, item, held_yaw)
     goal = replace(make_bin_goal_at_any_yaw(cell, bin_name, item, drop_height), yaws=yaws)
     opening = cell.tool_model.compute_release_opening(object_class)
-    free_yaws, blocker = find_free_yaws(cell, goal, opening, list_obstacles(cell, item))
+    free_yaws, blocker = find_free_yaws(
+        cell.tool_model, opening, goal, list_obstacles(cell, item), cell.bins.values(), cell.motion.margin
+    )
     if free_yaws is None and yaws:
         raise Blocked(f"the fingers cannot open at the yaw that {bin_name} needs: {blocker} is in the way")
     return replace(goal, yaws=free_yaws or ())
@@ -126,42 +137,51 @@ def _list_place_yaws(cell: Cell, bin_name: str, item: Item, held_yaw: Yaw | None
 
 
 def find_free_yaws(
-    cell: Cell, goal: Goal, opening: float, obstacles: Sequence[Obstacle]
+    tool: ToolModel,
+    opening: float,
+    goal: Goal,
+    obstacles: Collection[Obstacle],
+    bins: Collection[Bin],
+    margin: float,
 ) -> tuple[tuple[float, ...] | None, str]:
     """Return the permitted yaws of a goal [rad] at which the fingers are clear of obstacles and bin walls.
 
-    The yaws are () if every yaw is permitted and free, and None if no yaw is free; the name of an obstacle
-    is then the second value. `opening` is the distance between the fingers [m].
+    The yaws are None if no yaw is free; the name of an obstacle is then the second value. `opening` is the
+    distance between the fingers [m], 0 for a tool without fingers, and `margin` the minimum distance of the
+    fingers from obstacles and walls [m].
     """
-    if not cell.tool_model.max_opening:
+    if not opening:
         return goal.yaws, ""
-    parts = cell.tool_model.list_parts(opening)
+    parts = tool.list_parts(opening)
+    distance = margin + SAFETY_DISTANCE
     candidates = goal.yaws or tuple(math.tau * index / YAW_COUNT for index in range(YAW_COUNT))
-    blockers = [_find_blocker(cell, goal, parts, yaw, obstacles) for yaw in candidates]
+    blockers = [_find_blocker(goal, parts, yaw, obstacles, bins, distance) for yaw in candidates]
     free_yaws = tuple(yaw for yaw, name in zip(candidates, blockers, strict=True) if not name)
-    if len(free_yaws) == len(candidates):
-        return goal.yaws, ""
-    return (free_yaws or None), next(filter(None, blockers))
+    return (free_yaws or None), next(filter(None, blockers), "")
 
 
 def _find_blocker(
-    cell: Cell, goal: Goal, parts: Sequence[ToolPart], yaw: float, obstacles: Sequence[Obstacle]
+    goal: Goal,
+    parts: Sequence[ToolPart],
+    yaw: float,
+    obstacles: Collection[Obstacle],
+    bins: Collection[Bin],
+    distance: float,
 ) -> str:
     """Return the name of an obstacle or bin that a part of the tool would hit at the goal, or ""."""
-    margin = cell.motion.margin + SAFETY_DISTANCE
     x, y, z = goal.position
     # The tool points down: its y axis is opposite to that of a frame with the same yaw.
     rotation = np.array([[math.cos(yaw), math.sin(yaw)], [math.sin(yaw), -math.cos(yaw)]])
     for part in parts:
-        bottom = z + part.offset - margin
+        bottom = z + part.offset - distance
         points = _list_base_points(part) @ rotation.T + (x, y)
-        enlargement = margin if part.sides else margin + part.radius
+        enlargement = distance if part.sides else distance + part.radius
         for obstacle in obstacles:
             if bottom < obstacle.top:
                 distances = np.hypot(*(points - (obstacle.x, obstacle.y)).T)
                 if distances.min() < obstacle.radius + enlargement:
                     return obstacle.name
-        for bin in cell.bins.values():
+        for bin in bins:
             if bottom < bin.position[2] + bin.size[2]:
                 for low, high in bin.walls:
                     outside = np.maximum(np.maximum(low - points, points - high), 0.0)

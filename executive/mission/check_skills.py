@@ -11,7 +11,8 @@ from pydantic import Field, TypeAdapter
 from executive.cell.config import CellConfig, ObjectConfig
 from executive.errors import InputError
 from executive.geometry import GRAVITY
-from executive.manipulation.tool_goals import MAX_ROLL_DISTANCE
+from executive.manipulation.grasps import find_free_yaws
+from executive.manipulation.tool_goals import MAX_ROLL_DISTANCE, make_slot_goal
 from executive.mission.analysis import CheckContext
 from executive.mission.cell_file import CellFile
 from executive.mission.check_nodes import check_constant
@@ -282,3 +283,20 @@ def check_slots(cell: CellFile, config: CellConfig, mission: Mission) -> Iterato
                 message = f"{problem}, but a {label} with its clearance needs {min_size:.4f} m"
                 hint = "Give the bin fewer slots or a larger size."
                 yield make_error(cell.find_span(("bins", name, "slots")), "layout", message, hint)
+        if problem := _explain_blocked_slot(config, name, label):
+            hint = "Give the bin fewer slots, a larger size or lower walls."
+            yield make_error(cell.find_span(("bins", name, "slots")), "layout", problem, hint)
+
+
+def _explain_blocked_slot(config: CellConfig, name: str, label: str) -> str:
+    """Return a clause about a slot of a bin without space for the fingers that release an object, or ""."""
+    object_class = config.objects[label].build_class(label)
+    opening = config.tool.compute_release_opening(object_class)
+    hold_height = config.tool.get_hold_height(object_class)
+    bin = config.bins[name].build_bin(name)
+    for index in range(len(bin.slots)):
+        goal = make_slot_goal(bin, index, hold_height, config.max_object_height)
+        free_yaws, blocker = find_free_yaws(config.tool, opening, goal, (), (bin,), config.motion.margin)
+        if free_yaws is None:
+            return f"fingers cannot open to release a {label} in slot {index + 1}: {blocker} is in the way"
+    return ""

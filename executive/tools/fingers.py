@@ -24,13 +24,18 @@ if TYPE_CHECKING:
 
 FINGER_JOINTS = ("tool_finger_1", "tool_finger_2")
 """Names of the joints of the fingers; each position is half of the opening [m]."""
-MIN_TIP_HEIGHT = 0.003
-"""Minimum height of the tips above the support of the object [m]: tips that press on a table cannot close."""
+MIN_TIP_HEIGHT = 0.006
+"""Minimum height of the tips above the support of the object [m]: 1 mm more than the default margin of cell
+files. Tips that press on a table cannot close."""
 TIP_CLEARANCE = 0.002
 """Distance between the tips and the top of an object at the start of the descent, beyond the margin of the
 cell file [m]."""
 PALM_CLEARANCE = 0.003
 """Minimum distance between the palm and the top of a held object [m]."""
+MIN_ALLOWANCE = 0.004
+"""Minimum distance of each open finger from an object that the gripper is declared to hold [m]."""
+MIN_OVERLAP = 0.004
+"""Minimum height of the part of an object between the pads [m]."""
 MIN_GRIP_WIDTH = 0.002
 """Minimum distance of fingers that hold an object beyond that of the closed fingers [m]."""
 OPENING_STEP = 0.004
@@ -71,8 +76,14 @@ class Fingers(ToolModel):
     """Distance between the closed fingers [m]."""
     finger: tuple[Length, Length, Length]
     """Size of a finger [m]: along the pad (x), along the motion of the fingers (y), and from palm to tip."""
+    root: tuple[Distance, Length] | None = None
+    """Distance from the tool centre point up to the thicker upper part of a finger, and its size along the
+    motion of the fingers [m]. If not given, all of the finger has the same size."""
     tip: Length = 0.01
     """Distance of the tips beyond the tool centre point [m]."""
+    depth: Distance = 0.0
+    """Distance from the tool centre point up to links that are nearer to the axis than the pads [m], for
+    objects with a flat top; 0: there are no such links below the palm."""
     palm: tuple[Length, Length]
     """Side lengths of the palm along x and y [m]; the palm reaches up to the flange."""
     force: Force
@@ -84,8 +95,10 @@ class Fingers(ToolModel):
     model: FingerModel | None = None
     """URDF of the gripper; by default, its links are boxes of the declared sizes. The sizes remain those with
     which motions are planned, so they enclose the links of the model."""
-    allowance: Length = 0.005
-    """Distance of each open finger from the object before the grasp and after the release [m]."""
+    allowance: Length = 0.006
+    """Distance of each open finger from the object before the grasp [m]."""
+    release_allowance: Length = 0.003
+    """Distance of each open finger from the object after the release [m]."""
     descent_speed: float = Field(0.25, ge=0.001, le=0.25)
     """Tool speed while the open fingers move down beside an object [m/s]."""
     width_tolerance: Length = 0.006
@@ -121,13 +134,23 @@ class Fingers(ToolModel):
 
     def list_parts(self, opening: float) -> Sequence[ToolPart]:
         """Return palm and fingers; the fingers are fully open at the opening 0."""
-        along_pad, thickness, length = self.finger
-        place = ((opening or self.stroke) + thickness) / 2
-        fingers = (
-            ToolPart.make_box(-self.tip, length, (along_pad, thickness), (0.0, sign * place))
-            for sign in (1, -1)
-        )
-        return (self._palm_part, *fingers)
+        parts = [self._palm_part]
+        for offset, length, thickness in self._finger_boxes:
+            sides = (self.finger[0], thickness)
+            place = ((opening or self.stroke) + thickness) / 2
+            parts.extend(ToolPart.make_box(offset, length, sides, (0.0, sign * place)) for sign in (1, -1))
+        return parts
+
+    @property
+    def _finger_boxes(self) -> list[tuple[float, float, float]]:
+        """Offset, length and thickness of the boxes of a finger [m], the upper one first."""
+        if self.root is None:
+            return [(-self.tip, self.finger[2], self.finger[1])]
+        height, thickness = self.root
+        return [
+            (height, self.palm_offset - height, thickness),
+            (-self.tip, self.tip + height, self.finger[1]),
+        ]
 
     def build_links(self) -> str:
         """Return the links and joints of the model, or boxes with prismatic joints."""
@@ -136,20 +159,23 @@ class Fingers(ToolModel):
             from executive.physics.arm_model import build_attached_links
 
             return build_attached_links(self.model.urdf, self.model.rotation_deg)
-        along_pad, thickness, length = self.finger
         template = Template(Path(__file__).with_name("finger.urdf").read_text(encoding="utf-8"))
         values = {
             "tool_length": self.length,
-            "size": f"{along_pad} {thickness} {length}",
-            "height": self.tip - length / 2,
             "max_position": self.stroke / 2,
             "speed": self.speed,
             "force": self.force,
         }
-        return "".join(
-            template.substitute(values, name=name, sign=sign, centre=sign * thickness / 2)
-            for name, sign in zip(FINGER_JOINTS, (1, -1), strict=True)
-        )
+        links = []
+        for name, sign in zip(FINGER_JOINTS, (1, -1), strict=True):
+            shapes = "".join(
+                f'<{shape}><origin xyz="0 {sign * thickness / 2} {-offset - length / 2}"/><geometry>'
+                f'<box size="{self.finger[0]} {thickness} {length}"/></geometry></{shape}>'
+                for offset, length, thickness in self._finger_boxes
+                for shape in ("visual", "collision")
+            )
+            links.append(template.substitute(values, name=name, sign=sign, shapes=shapes))
+        return "".join(links)
 
     def compute_joint_positions(self, opening: float) -> Mapping[str, float]:
         """Return the positions at an opening [m]; at the opening 0, the fingers are fully open."""
@@ -182,32 +208,42 @@ class Fingers(ToolModel):
         return 2 * self.force
 
     def compute_holding_force(self, object_class: ObjectClass, force: float) -> float:
-        """Return the friction of both fingers on an object [N], by Coulomb's law."""
-        return force * self.friction * object_class.friction
+        """Return the friction of both fingers on an object [N], by Coulomb's law.
+
+        Above or below the centre of mass, the pads also resist a moment. The lever of their friction is two
+        thirds of the radius of a circle with the area of a pad, as for a disc under constant pressure.
+        """
+        pad_radius = math.sqrt(self.finger[0] * 2 * self.tip / math.pi)
+        distance = abs(self.get_hold_height(object_class) - object_class.height / 2)
+        lever_ratio = 2 / 3 * pad_radius / distance if distance else 1.0
+        return force * self.friction * object_class.friction * min(lever_ratio, 1.0)
 
     def explain_unsuitable(self, object_class: ObjectClass) -> str:
         """Return a clause about an object that is too wide or too low, or that slips out of the fingers."""
         label = object_class.label
         width = min(width for width, _ in self._list_widths(object_class))
-        if width + 2 * self.allowance > self.stroke:
-            needed = f"{(width + 2 * self.allowance) * 1000:.0f} mm"
+        if width + 2 * MIN_ALLOWANCE > self.stroke:
+            needed = f"{(width + 2 * MIN_ALLOWANCE) * 1000:.0f} mm"
             return f"a {label} needs an opening of {needed}, and the fingers open {self.stroke * 1000:.0f} mm"
         if width <= self.closed:
             closed = f"the fingers close to {self.closed * 1000:.0f} mm"
             return f"a {label} is {width * 1000:.0f} mm wide, and {closed}"
-        if self.get_hold_height(object_class) > object_class.height:
+        if object_class.height < MIN_TIP_HEIGHT + MIN_OVERLAP:
             return f"a {label} is {object_class.height * 1000:.0f} mm high, too low for the fingers"
         return ""
 
     def get_hold_height(self, object_class: ObjectClass) -> float:
         """Return the height of the pads above the underside of an object [m]: the middle, if possible."""
-        lowest = max(self.tip + MIN_TIP_HEIGHT, object_class.height + PALM_CLEARANCE - self.palm_offset)
+        depth = self.palm_offset - PALM_CLEARANCE
+        if self.depth and object_class.flat_top:
+            depth = self.depth
+        lowest = max(self.tip + MIN_TIP_HEIGHT, object_class.height - depth)
         return max(object_class.grip_height or object_class.height / 2, lowest)
 
     def compute_release_opening(self, object_class: ObjectClass) -> float:
-        """Return the width of an object, and the allowance on both sides [m]."""
+        """Return the width of an object, and the allowance of a release on both sides [m]."""
         width = max(width for width, _ in self._list_widths(object_class))
-        return min(width + 2 * self.allowance, self.stroke)
+        return min(width + 2 * self.release_allowance, self.stroke)
 
     def list_grasps(
         self, object_class: ObjectClass, target: Target, motion: MotionConfig, attempt: GraspAttempt
@@ -218,7 +254,8 @@ class Fingers(ToolModel):
         angle of an object is unknown, its circle around the outline counts.
         """
         x, y, z = map(float, target.pose_at(target.stamp).position)
-        bottom = z - object_class.height / 2
+        # A wrong depth image shows objects below the table, on which they cannot lie.
+        bottom = max(z - object_class.height / 2, 0.0)
         end_height = bottom + self.get_hold_height(object_class)
         clearance = max(motion.descent, motion.margin + TIP_CLEARANCE)
         start_height = bottom + object_class.height + self.tip + clearance
@@ -289,13 +326,16 @@ class Fingers(ToolModel):
         if footprint is None or not object_class.yaw_symmetry:
             return [(2 * object_class.radius, ())]
         length, width = footprint
+        symmetry = object_class.yaw_symmetry
         # The fingers close along y; both directions of the tool are equal.
         across = (0.0, math.pi)
         along = (math.pi / 2, -math.pi / 2)
-        if math.isclose(length, width):
-            return [(width, (*across, *along))]
+        if symmetry > 2:
+            narrow_side = across[0] if width <= length else along[0]
+            yaws = tuple(narrow_side + math.tau * index / symmetry for index in range(symmetry))
+            return [(min(footprint), yaws)]
         pairs: list[tuple[float, tuple[float, ...]]] = sorted([(width, across), (length, along)])
-        return [pair for pair in pairs if pair[0] + 2 * self.allowance <= self.stroke] or pairs[:1]
+        return [pair for pair in pairs if pair[0] + 2 * MIN_ALLOWANCE <= self.stroke] or pairs[:1]
 
     def _list_grip_ranges(self, object_class: ObjectClass) -> list[tuple[float, float]]:
         """Return the smallest and largest distances of the fingers at a grip of an object [m]."""

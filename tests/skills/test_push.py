@@ -25,9 +25,9 @@ def fingers(missions: Path) -> FakeCell:
 
 
 def put_neighbours(fake: FakeCell, direction: tuple[float, float]) -> None:
-    """Put spheres on both sides of the cube, so that they touch the circle around it."""
+    """Put spheres on both sides of the cube, nearer than the circle around it."""
     for sign in (1, -1):
-        fake.world.put("sphere", *(PLACE + sign * 0.0655 * np.array(direction)))
+        fake.world.put("sphere", *(PLACE + sign * 0.062 * np.array(direction)))
 
 
 def test_a_push_leads_across_the_row_and_the_ledger_knows_the_new_place(fingers: FakeCell) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from at_hand import look
+from at_terminal import invoke
 
 from executive.cell.config import CellConfig
 from executive.cell.device_config import STEP, MotionConfig
@@ -37,6 +38,7 @@ TOOL = Fingers(
 )
 CUBE = ObjectClass("cube", 0.05, 0.0354, footprint=(0.05, 0.05), yaw_symmetry=4, friction=1.0)
 BAR = ObjectClass("bar", 0.03, 0.051, footprint=(0.10, 0.02), yaw_symmetry=2)
+NUT = ObjectClass("nut", 0.018, 0.0219, footprint=(0.0438, 0.038), yaw_symmetry=6)
 BALL = ObjectClass("ball", 0.07, 0.035)
 MOTION = MotionConfig()
 
@@ -54,7 +56,7 @@ def list_grasps(object_class: ObjectClass, yaw: Yaw | None, number: int = 0):
 
 @pytest.mark.parametrize(
     ("object_class", "yaw_counts", "openings"),
-    [(CUBE, [4], [0.06]), (BAR, [2, 2], [0.03, 0.11]), (BALL, [0], [0.08])],
+    [(CUBE, [4], [0.062]), (BAR, [2, 2], [0.032, 0.11]), (NUT, [6], [0.05]), (BALL, [0], [0.082])],
 )
 def test_fingers_close_on_opposite_sides_the_narrowest_first(object_class, yaw_counts, openings) -> None:
     grasps = list_grasps(object_class, Yaw(0.3, 0.0))
@@ -72,13 +74,13 @@ def test_an_uncertain_yaw_a_failed_attempt_and_an_unknown_yaw_open_the_fingers_w
     assert openings[1] == pytest.approx(openings[0] + 2 * CUBE.radius * math.sin(0.15))
     assert openings[2] > openings[0]
     (grasp,) = list_grasps(CUBE, None)
-    assert (grasp.goal.yaws, grasp.opening) == ((), pytest.approx(2 * CUBE.radius + 0.01))
+    assert (grasp.goal.yaws, grasp.opening) == ((), pytest.approx(2 * CUBE.radius + 2 * TOOL.allowance))
 
 
 @pytest.mark.parametrize("height", [0.008, 0.05, 0.14])
 def test_tips_stay_above_the_table_and_the_palm_above_the_object(height: float) -> None:
     hold_height = TOOL.get_hold_height(replace(CUBE, height=height))
-    assert hold_height - TOOL.tip >= 0.003
+    assert hold_height - TOOL.tip >= 0.006
     assert hold_height + TOOL.palm_offset >= height + 0.003
 
 
@@ -86,8 +88,8 @@ def test_tips_stay_above_the_table_and_the_palm_above_the_object(height: float) 
     ("changes", "text"),
     [
         ({}, ""),
-        ({"footprint": (0.105, 0.105), "radius": 0.08}, "a cube needs an opening of 115 mm"),
-        ({"height": 0.008}, "a cube is 8 mm high, too low"),
+        ({"footprint": (0.105, 0.105), "radius": 0.08}, "a cube needs an opening of 113 mm"),
+        ({"height": 0.006}, "a cube is 6 mm high, too low"),
     ],
 )
 def test_an_object_that_fits_between_no_fingers_is_unsuitable(changes, text) -> None:
@@ -104,6 +106,12 @@ def test_the_width_is_evidence_about_the_class(opening, is_contradiction, is_mis
     assert (bool(measurement.contradiction), measurement.is_miss) == (is_contradiction, is_miss)
 
 
+def test_a_grip_above_the_centre_of_mass_holds_less() -> None:
+    tall = replace(CUBE, height=0.2)
+    assert TOOL.get_hold_height(tall) > 0.1
+    assert TOOL.compute_holding_force(tall, 10.0) < TOOL.compute_holding_force(CUBE, 10.0) / 2
+
+
 def test_classes_of_different_widths_are_distinct() -> None:
     classes = {each.label: each for each in (CUBE, BALL, replace(CUBE, label="box", height=0.04))}
     assert TOOL.find_distinct_labels(classes) == {"ball"}
@@ -112,9 +120,9 @@ def test_classes_of_different_widths_are_distinct() -> None:
 class Bench:
     """An object between the open fingers, and an arm that is put where it should be."""
 
-    def __init__(self, config: CellConfig, label: str, **changes: float) -> None:
-        tool = config.tool.model_copy(update=changes)
-        self.world = World(config.model_copy(update={"tool": tool}))
+    def __init__(self, config: CellConfig, label: str) -> None:
+        tool = config.tool
+        self.world = World(config)
         self.tool: SimFingers = tool.build_sim(self.world)
         kinematics = build_kinematics(self.world.config)
         object_class = config.objects[label].build_class(label)
@@ -146,7 +154,7 @@ class Bench:
         self.steps(60)
 
 
-@pytest.mark.parametrize(("label", "width"), [("cube", 0.05), ("sphere", 0.06), ("duck", 0.0403)])
+@pytest.mark.parametrize(("label", "width"), [("cube", 0.05), ("sphere", 0.06), ("duck", 0.0423)])
 def test_friction_alone_lifts_an_object_and_its_width_and_weight_are_measured(config, label, width) -> None:
     bench = Bench(config, label)
     bench.lift()
@@ -157,14 +165,15 @@ def test_friction_alone_lifts_an_object_and_its_width_and_weight_are_measured(co
     bench.tool.open()
     bench.steps(60)
     assert not bench.tool.holding
-    assert bench.tool.opening == pytest.approx(width + 0.01, abs=0.003)
+    assert bench.tool.opening == pytest.approx(width + 2 * config.tool.release_allowance, abs=0.003)
     assert bench.world.get_object_pose(bench.body).position[2] < 0.04
 
 
-@pytest.mark.parametrize(("factor", "is_held"), [(0.9, False), (1.2, True)])
-def test_an_object_slips_just_below_the_limit_of_friction(config, factor: float, is_held: bool) -> None:
-    # Two fingers with the coefficient 1.0 * 0.5 carry the weight with a force of m g.
-    bench = Bench(config, "sphere", force=factor * 0.1 * GRAVITY)
+@pytest.mark.parametrize(("factor", "is_held"), [(0.9, True), (1.1, False)])
+def test_an_object_slips_just_above_the_limit_of_friction(config, factor: float, is_held: bool) -> None:
+    # Two fingers with the coefficient 1.0 * 0.5 carry a weight that is equal to their force.
+    bench = Bench(config, "sphere")
+    bench.world.client.changeDynamics(bench.body, -1, mass=factor * config.tool.force / GRAVITY)
     bench.lift()
     assert bool(bench.world.get_object_pose(bench.body).position[2] > 0.1) is is_held
 
@@ -177,8 +186,7 @@ def test_a_loss_is_detected_within_a_tenth_of_a_second(config: CellConfig) -> No
     while bench.tool.holding and step_count < 240:
         bench.steps(1)
         step_count += 1
-    # The fingers first close by 48 mm.
-    assert step_count * STEP <= 0.1 + 0.048 / (2 * config.tool.speed)
+    assert step_count * STEP <= 0.1
     assert bench.tool.dropped_bodies == {bench.body}
 
 
@@ -201,6 +209,13 @@ def test_neighbours_on_all_sides_block_a_grasp_and_are_named(fake_fingers, gap: 
             choose_grasp(fake_fingers.cell, target)
     else:
         assert choose_grasp(fake_fingers.cell, target)[0].opening > 0.05
+
+
+def test_check_names_a_slot_in_which_the_fingers_cannot_open() -> None:
+    slots = "cell.bins.red_bin.slots=[3, 4]"
+    result = invoke("check", "sort_overhead", "--cell", "iiwa_wsg50", "--set", slots)
+    assert result.exit_code == 2
+    assert "cannot open to release a cube in slot 1: the wall of red_bin is in the way" in result.output
 
 
 def test_a_rehearsal_sorts_with_fingers_and_their_faults_have_their_wording(missions: Path) -> None:

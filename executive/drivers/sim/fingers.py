@@ -30,6 +30,8 @@ SENSOR_TIME = 0.04
 before the sensor reports a loss."""
 MIN_WIDTH = 0.002
 """Minimum distance of the fingers at a grip beyond that of the closed fingers [m]."""
+MAX_CLOSING = 0.005
+"""Maximum distance by which fingers close on an object that shifts between them, without pressing [m]."""
 MIN_FORCE_FRACTION = 0.5
 """Minimum force of a finger at a grip, as a fraction of the declared force."""
 MIN_TOUCH_FORCE = 2.0
@@ -57,7 +59,7 @@ class FingerTool(Protocol):
     def friction(self) -> float: ...
 
     @property
-    def allowance(self) -> float: ...
+    def release_allowance(self) -> float: ...
 
     @property
     def load_std(self) -> float: ...
@@ -106,6 +108,8 @@ class SimFingers:
         self._links = [link for link in world.joint_counts if world.is_tool(link)]
         self._is_closing = False
         self._pressing_time = 0.0
+        self._grip_opening = 0.0
+        """Distance between the fingers when they pressed last [m]."""
         self._load = 0.0
         self._separated_body: int | None = None
         client = world.client
@@ -153,6 +157,7 @@ class SimFingers:
 
     def close(self) -> None:
         self._world.log_command(world_log.CLOSE)
+        self._end_separation()
         self._is_closing = True
         self._command(self._model.closed)
 
@@ -162,7 +167,7 @@ class SimFingers:
         if body is not None:
             self._world.rest_positions.setdefault(body, []).append(self._world.get_object_pose(body).position)
         if opening or self._is_closing:
-            released = self.opening + 2 * self._model.allowance
+            released = self.opening + 2 * self._model.release_allowance
             self._command(min(opening or released, self._model.stroke))
         self._is_closing = False
         self._pressing_time = 0.0
@@ -178,9 +183,8 @@ class SimFingers:
     def advance(self) -> None:
         """Move the coupled joints, and update the sensors after a physics step."""
         self._move_coupled_joints()
-        if not self._is_closing and self._separated_body is not None:
-            self._set_collision(self._separated_body, True)
-            self._separated_body = None
+        if not self._is_closing:
+            self._end_separation()
         reaction = self._world.client.getJointState(self._world.arm, self._world.tool_index)[2][:3]
         upward_force = float(self._world.get_flange_pose().rotation[2] @ reaction)
         self._load += LOAD_SMOOTHING * (upward_force - self._weight - self._load)
@@ -190,6 +194,8 @@ class SimFingers:
             self.opening > self._model.closed + MIN_WIDTH
             and self._measure_force() >= MIN_FORCE_FRACTION * self._model.force
         )
+        if is_pressing:
+            self._grip_opening = self.opening
         change = STEP if is_pressing else -STEP
         self._pressing_time = min(max(self._pressing_time + change, 0.0), SENSOR_TIME)
         if not self.holding and self._pressing_time >= SENSOR_TIME:
@@ -197,11 +203,15 @@ class SimFingers:
             self.held_body = self._find_body_between()
             if self.held_body is not None:
                 self.dropped_bodies.discard(self.held_body)
-        elif self.holding and self._pressing_time <= 0:
+        elif self.holding and self._pressing_time <= 0 and self.opening < self._get_loss_opening():
             self.holding = False
             if self.held_body is not None:
                 self.dropped_bodies.add(self.held_body)
             self.held_body = None
+
+    def _get_loss_opening(self) -> float:
+        """Return the distance between the fingers below which they have lost the object [m]."""
+        return max(self._grip_opening - MAX_CLOSING, self._model.closed + MIN_WIDTH)
 
     def _command(self, opening: float) -> None:
         """Move the fingers to a distance [m] with the declared force and speed."""
@@ -245,6 +255,11 @@ class SimFingers:
     def _set_collision(self, body: int, enabled: bool) -> None:
         for link in self._links:
             self._world.client.setCollisionFilterPair(self._world.arm, body, link, -1, int(enabled))
+
+    def _end_separation(self) -> None:
+        if self._separated_body is not None:
+            self._set_collision(self._separated_body, True)
+            self._separated_body = None
 
     def _separate(self, body: int | None) -> None:
         """Let a body pass through the fingers until the next physics step with open fingers.
