@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from tests.benchmarks import (
     continuous,
     damaged_records,
     foreign_arms,
+    grasps,
     halts,
     hostile_input,
     kills,
@@ -139,6 +141,15 @@ def test_yaws_in_rendered_images_are_measured() -> None:
 
 def load_row(**overrides: str) -> MissionUnderTest:
     return load_mission_under_test("sort_overhead", overrides, has_oracle=True, seed=1, cell="iiwa_wsg50")
+
+
+def test_grasps_of_a_gripper_and_the_limit_of_its_friction_are_measured() -> None:
+    cell = load_cell(find_cell("iiwa_wsg50"))
+    with closing(grasps.Gantry(cell)) as gantry:
+        row = grasps.measure_class(gantry, "cube", 1, np.random.default_rng(1))
+    assert (row["held %"], row["limits"]) == (100, "")
+    row = grasps.measure_limit(cell, "too heavy", 1.1, 1.0, 1.0)
+    assert (row["predicted"], row["measured"], row["limits"]) == ("slips", "slips", "")
 
 
 def test_rows_of_objects_are_sorted(tmp_path: Path) -> None:
