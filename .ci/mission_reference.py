@@ -15,6 +15,7 @@ from executive.behaviours import load_skills
 from executive.cell.arm_config import ArmFile
 from executive.cell.config import CellConfig
 from executive.cell.device_config import Section
+from executive.cell.tools import load_tool_models
 from executive.cli.check import Declaration, collect_declarations
 from executive.cli.main import main as command_line
 from executive.drivers.sim.scene import SceneConfig
@@ -74,6 +75,7 @@ def generate() -> str:
         "Subtrees of library/sorting.yaml": _sorting_library(),
         "Shipped missions": _shipped_missions(),
         "Cell files": _model(CellConfig),
+        "Tools": _tools(),
         "Arm files": _model(ArmFile),
         "Detectors": _detectors(),
         "Scene files": _model(SceneConfig),
@@ -184,6 +186,12 @@ def _shipped_missions() -> Iterator[str]:
     yield _table("mission, cell, meaning", rows)
 
 
+def _tools() -> Iterator[str]:
+    for name, model in load_tool_models().items():
+        yield f"### Tool `{name}`"
+        yield from _model(model)
+
+
 def _detectors() -> Iterator[str]:
     for name, entry in find_detector_kinds().items():
         yield f"### Kind `{name}`\n\n{(inspect.getdoc(entry.load()) or '').splitlines()[0]}"
@@ -197,7 +205,8 @@ def _model(model: type[Section]) -> Iterator[str]:
     paths: dict[str, list[str]] = {}
 
     def visit(part: Schema, prefix: str) -> None:
-        for name, key in part["properties"].items():
+        # The section `tool` has the keys of its kind, which have a chapter of their own.
+        for name, key in part.get("properties", {}).items():
             for one in key.get("anyOf", [key]):
                 named = one.get("additionalProperties")
                 if "$ref" in (section := named if isinstance(named, dict) else one):
@@ -207,7 +216,10 @@ def _model(model: type[Section]) -> Iterator[str]:
                     visit(schema["$defs"][definition], f"{path}.")
 
     visit(schema, "")
-    for definition, section in {"": schema, **{name: schema["$defs"][name] for name in paths}}.items():
+    sections = {"": schema, **{name: schema["$defs"][name] for name in paths}}
+    for definition, section in sections.items():
+        if "properties" not in section:
+            continue
         rows = []
         for name, key in section["properties"].items():
             default = ... if name in section.get("required", ()) else key.get("default")

@@ -24,7 +24,7 @@ ROOT = Path(__file__).parent.parent
 TUTORIAL = "missions/README.md"
 MISSION_GUIDES = (
     TUTORIAL, "missions/expressions.md", "missions/running.md", "missions/editor.md", "missions/detectors.md",
-    "missions/scenes.md", "missions/arms.md",
+    "missions/scenes.md", "missions/arms.md", "missions/tools.md",
 )  # fmt: skip
 GUIDES = ("README.md", *MISSION_GUIDES, "skills/README.md")
 
