@@ -48,7 +48,7 @@ class MotionGuard(NamedTuple):
         touch: The tool touches something that it did not touch at the start of the motion; if it holds an
             object, this object does, during the guarded descent.
         lost_grip: The tool no longer holds anything.
-        push_force: Maximum force of a contact of the tool in the guarded part that is no collision [N].
+        push_force: Maximum force at a point of the tool in the guarded part that is no collision [N].
     """
 
     touch: bool = False
@@ -99,7 +99,7 @@ class Task:
         holding_force: Maximum force with which the tool holds the load [N].
         obstacles: Obstacles that are not in the cell file: objects on the table and in the bins.
         target: Obstacle that the tool may touch during the guarded descent, or None.
-        opening: Distance between the fingers of the tool during the motion [m].
+        opening: Distance between the fingers of the tool during the motion [m]; 0: fully open, or no fingers.
     """
 
     load: ObjectClass | None = None

@@ -199,7 +199,7 @@ class ToolModel(Section):
         return 0.0
 
     def list_parts(self, opening: float) -> Sequence[ToolPart]:  # noqa: ARG002
-        """Return `parts`, and the fingers at an opening [m], the lowest part last."""
+        """Return `parts`, and the fingers at an opening [m], the lowest last and the palm first."""
         return self.parts
 
     def build_links(self) -> str:

@@ -20,7 +20,7 @@ from executive.cell.tools import (
     ToolPart,
 )
 from executive.errors import Blocked, Fault
-from executive.geometry import Array, Yaw, compute_tool_yaw
+from executive.geometry import Array, Yaw, compute_tool_yaw, make_tool_down_pose
 from executive.manipulation.tool_goals import (
     DROP_HEIGHT,
     list_obstacles,
@@ -60,6 +60,8 @@ def choose_grasp(
     )
     object_class = cell.classes[target.label]
     grasps = cell.tool_model.list_grasps(object_class, target, cell.motion, attempt)
+    if not grasps and target.yaw is None and object_class.yaw_symmetry:
+        raise Blocked(f"{target.item} fits between the fingers only at a known yaw, which no image showed")
     if not grasps:
         raise Fault(f'the tool "{cell.tool_model.kind}" lists no grasp of a {target.label}')
     obstacles = list_obstacles(cell, target.item)
@@ -104,8 +106,8 @@ def make_bin_goal(
     item relative to the tool.
 
     Raises:
-        Blocked: The bin needs the yaw of the item, which is unknown, or the fingers would hit something at
-            each permitted yaw; the message names it.
+        Blocked: The bin needs the yaw of the item, which is unknown or at which the fingers would hit
+            something; the message names it.
     """
     object_class = cell.classes[cell.ledger.get_label(item)]
     yaws = _list_place_yaws(cell, bin_name, item, held_yaw)
@@ -170,8 +172,7 @@ def _find_blocker(
 ) -> str:
     """Return the name of an obstacle or bin that a part of the tool would hit at the goal, or ""."""
     x, y, z = goal.position
-    # The tool points down: its y axis is opposite to that of a frame with the same yaw.
-    rotation = np.array([[math.cos(yaw), math.sin(yaw)], [math.sin(yaw), -math.cos(yaw)]])
+    rotation = make_tool_down_pose(goal.position, yaw).rotation[:2, :2]
     for part in parts:
         bottom = z + part.offset - distance
         points = _list_base_points(part) @ rotation.T + (x, y)

@@ -30,6 +30,8 @@ FINGER_CHECK_TIME = 0.05
 """Time in which fingers at rest keep their distance [s]."""
 MAX_OPENING_CHANGE = 5e-4
 """Maximum change of the distance between fingers at rest in this time [m]."""
+MAX_FINGER_CHECK_COUNT = 100
+"""Maximum number of such checks; a broken sensor may never show fingers at rest."""
 MAX_PLANNING_ATTEMPTS = 3
 """Maximum number of planning attempts for one motion; an update of the ledger may change goal or task."""
 
@@ -241,8 +243,11 @@ def wait_for_fingers(cell: Cell) -> Steps:
     if not cell.tool_model.max_opening:
         return
     previous_opening = math.inf
-    while abs(cell.tool.opening - previous_opening) > MAX_OPENING_CHANGE:
-        previous_opening = cell.tool.opening
+    for _ in range(MAX_FINGER_CHECK_COUNT):
+        opening = cell.tool.opening
+        if abs(opening - previous_opening) <= MAX_OPENING_CHANGE:
+            return
+        previous_opening = opening
         yield from cell.clock.sleep(FINGER_CHECK_TIME)
 
 

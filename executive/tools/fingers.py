@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
 FINGER_JOINTS = ("tool_finger_1", "tool_finger_2")
 """Names of the joints of the fingers; each position is half of the opening [m]."""
-MIN_TIP_HEIGHT = 0.006
-"""Minimum height of the tips above the support of the object [m]: 1 mm more than the default margin of cell
+MIN_TIP_HEIGHT = 0.008
+"""Minimum height of the tips above the support of the object [m]: 3 mm more than the default margin of cell
 files. Tips that press on a table cannot close."""
 TIP_CLEARANCE = 0.002
 """Distance between the tips and the top of an object at the start of the descent, beyond the margin of the
@@ -88,7 +88,7 @@ class Fingers(ToolModel):
     """Side lengths of the palm along x and y [m]; the palm reaches up to the flange."""
     force: Force
     """Force of each finger on the object [N]."""
-    speed: float = Field(0.1, ge=0.001, le=1)
+    speed: float = Field(0.1, ge=0.01, le=1)
     """Speed of each finger [m/s]."""
     friction: float = Field(1.0, ge=0.05, le=5)
     """Coefficient of friction of the pads; that of a contact is the product with `friction` of the object."""
@@ -111,6 +111,8 @@ class Fingers(ToolModel):
             raise ValueError(f"needs a stroke above the distance of the closed fingers, {self.closed:g} m")
         if self.finger[2] - self.tip >= self.length:
             raise ValueError(f"needs fingers that are shorter than its length, {self.length:g} m")
+        if self.palm_offset <= (self.root[0] if self.root else 0.0):
+            raise ValueError("needs fingers that are longer than their tips below the root")
         return self
 
     @property
@@ -260,6 +262,8 @@ class Fingers(ToolModel):
         clearance = max(motion.descent, motion.margin + TIP_CLEARANCE)
         start_height = bottom + object_class.height + self.tip + clearance
         yaw = target.yaw
+        if not yaw and 2 * object_class.radius + 2 * MIN_ALLOWANCE > self.stroke:
+            return []
         grasps = []
         widths = self._list_widths(object_class) if yaw else [(2 * object_class.radius, ())]
         for width, directions in widths:
@@ -282,12 +286,13 @@ class Fingers(ToolModel):
     def compute_held_yaw(self, yaw: Yaw, tool_yaw: float) -> Yaw:
         """Return the yaw of an object whose sides the fingers have turned parallel to the pads."""
         held_yaw = super().compute_held_yaw(yaw, tool_yaw)
-        quarter_turn = math.pi / 2
-        return held_yaw._replace(angle=round(held_yaw.angle / quarter_turn) * quarter_turn)
+        # Sides of the object and directions of the fingers are equal after these rotations.
+        step = math.tau / math.lcm(4, yaw.symmetry)
+        return held_yaw._replace(angle=round(held_yaw.angle / step) * step)
 
     def compute_grip_opening(self, object_class: ObjectClass) -> float:
-        """Return the middle of the smallest range of distances of the fingers at a grip [m]."""
-        return sum(min(self._list_grip_ranges(object_class))) / 2
+        """Return the middle of the largest range of distances of the fingers at a grip [m]."""
+        return sum(max(self._list_grip_ranges(object_class))) / 2
 
     def measure_grip(self, object_class: ObjectClass, opening: float) -> ToolMeasurement:
         """Return a contradiction if the distance of the fingers is that of no grasp of the class.

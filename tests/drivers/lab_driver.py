@@ -21,8 +21,7 @@ IMAGES = "images.npy"
 """File beside the cell file: images `(N, H, W, 3)` of the table before the first pick and after each pick."""
 OBJECT_HEIGHT = 0.05
 """Height of all objects [m]."""
-OBJECT_WEIGHT = 1.0
-"""Weight of all objects [N]."""
+OBJECT_WEIGHT = 1.0  # Weight of all objects [N].
 GUARD_PERIOD = 0.001  # Time between two checks of a guard on the path of a motion [s].
 
 
@@ -66,6 +65,7 @@ class LabTool:
     """A tool that holds whatever it touches when it closes."""
 
     load_std = 0.01
+    opening = 0.0
 
     def __init__(self, arm: LabArm) -> None:
         self.holding = False
@@ -88,7 +88,7 @@ class LabTool:
         self.holding = self.touching
         self.pick_count += self.holding
 
-    def open(self) -> None:
+    def open(self, opening: float = 0.0) -> None:
         self.holding = False
 
 

@@ -31,7 +31,7 @@ def complaint(text: str, overrides: dict[str, str] | None = None) -> str:
         ("table: {x: [0.4", "tabel: {x: [0.4", 'c.yaml:13:1: error[unknown-key]: the file has no key "tabel"\n'),
         ("cup_radius", "cup_radios", 'c.yaml:12:8: error[unknown-key]: tool has no key "cup_radios"\n'),
         ("force: 12.0", "force: strong", 'c.yaml:12:34: error[wrong-type]: tool.force must be a number, not the text "strong"\n'),
-        ("cup_radius: 0.006", "kind: [nail]", 'error[wrong-value]: tool has no installed kind "[\'nail\']"; installed: suction\n'),
+        ("cup_radius: 0.006", "kind: [nail]", 'error[wrong-value]: tool has no installed kind "[\'nail\']"; installed: fingers, suction\n'),
         ("force: 12.0", "force: 0", "error[out-of-range]: tool.force must be at least 0.001, not 0\n"),
         ("{home: [0, 0", "{hme: [0, 0", 'arm needs a pose named "home"; there are: hme, scan\n'),
         ("scan_poses: [home]", "scan_poses: [hom]", 'c.yaml:25:18: error[unknown-pose]: the arm has no pose "hom"; arm.poses_deg has: home, scan\n'),

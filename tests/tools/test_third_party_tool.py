@@ -87,7 +87,7 @@ def test_the_schema_of_cells_contains_it_beside_the_shipped_kinds(mission: Path)
     kinds = [
         one["properties"]["kind"]["const"] for one in make_cell_schema()["definitions"]["ToolModel"]["anyOf"]
     ]
-    assert kinds == ["magnet", "suction"]
+    assert kinds == ["fingers", "magnet", "suction"]
 
 
 def test_it_sorts_the_objects_that_it_can_hold(mission: Path) -> None:
