@@ -10,7 +10,7 @@ from executive.cell.objects import Target
 from executive.cell.protocols import Cell, Steps
 from executive.cell.tools import CONTACT_SPACING, OVERTRAVEL, GraspPose
 from executive.manipulation.grasps import choose_grasp
-from executive.manipulation.motions import follow, plan
+from executive.manipulation.motions import MAX_OPENING_CHANGE, follow, plan, wait_for_fingers
 from executive.manipulation.tool_goals import find_max_object_height
 from executive.skill import EMPTY, In, Metres, Skill, param, port
 
@@ -72,6 +72,10 @@ class Approach(Skill):
         cell.ledger.record_empty_load(tool.load)
         first_touch_height = 0.0
         opening_time = self._find_opening_time(cell, grasp, motion)
+        if opening_time <= cell.clock.now and tool.opening < grasp.opening - MAX_OPENING_CHANGE:
+            # Slow fingers would otherwise come down on the object.
+            tool.open(grasp.opening)
+            yield from wait_for_fingers(cell)
 
         def record_first_touch() -> bool:
             nonlocal first_touch_height, opening_time

@@ -24,6 +24,8 @@ PUSH_LENGTHS = (0.02, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08)
 """Lengths of pushes that are tried [m]."""
 MAX_EXCESS_LENGTH = 0.015
 """Maximum distance by which an object moves farther than intended [m]: it may roll, or be wider."""
+MAX_LIFT = 0.01
+"""Maximum height of the underside of a pushed object above the table [m], for errors of a depth image."""
 MAX_APPROACH = 0.002
 """Maximum distance by which a pushed object may come nearer to a neighbour that it touches [m]."""
 MAX_ATTEMPTS = 4
@@ -57,6 +59,8 @@ class Push(Skill):
             raise self.failure("stale", f"the robot may have moved {item} since its detection; look again")
         if not explain_blocked_grasp(cell, self.target):
             raise self.failure("blocked", f"no neighbour of {item} is in the way; a push does not help")
+        if self.target.position[2] > cell.classes[self.target.label].height / 2 + MAX_LIFT:
+            raise self.failure("blocked", f"{item} lies on another object, and a push would throw it down")
         failure = self.failure("blocked", f"there is no place with space for the fingers near {item}")
         pushes = []
         for number in range(DIRECTION_COUNT):

@@ -172,7 +172,7 @@ def find_blocked_motions(config: CellConfig) -> Iterator[str]:
     slots = {
         name: make_slot_goal(bin, 0, hold_height, load.height) for name, bin in config.build_bins().items()
     }
-    task = Task(load, config.tool.max_holding_force)
+    task = Task(load, config.tool.compute_holding_force(load, config.tool.max_holding_force))
     for pose_name, pose in config.arm.poses_deg.items():
         for x, y in workspace.points[:: POINTS_PER_SIDE - 1].tolist():
             motion = f'from the pose "{pose_name}" to ({x:g}, {y:g}) m'
