@@ -152,6 +152,7 @@ def test_grasps_of_a_gripper_and_the_limit_of_its_friction_are_measured() -> Non
     assert (row["predicted"], row["measured"], row["limits"]) == ("slips", "slips", "")
 
 
+@pytest.mark.slow
 def test_rows_of_objects_are_sorted(tmp_path: Path) -> None:
     figures = rows.measure(load_row(), tmp_path, workers=1, rows=1, objects=2, gap_mm=8)
     assert (figures["problems"], figures["gaps"][0]["placed"]) == ([], 2)
