@@ -32,7 +32,7 @@ MIN_CHANGED_FRACTION = 0.5
 """Minimum change of the visible area in a bin, as a fraction of the area of the smallest class."""
 MIN_AREA_FACTORS = (0.5, 0.9)
 """Minimum visible area of an object in a bin: as a multiple of the area of its outline from above, and, of a
-prism with a flat top, as a multiple of the visible area at the centre of the bin."""
+prism with a flat top, as a multiple of the visible area at its slot or, if less, at the centre of the bin."""
 MAX_AREA_FACTORS = (1.7, 1.4)
 """Maximum visible area, as a multiple of the circle around an object, and of the visible area of a prism.
 
@@ -46,8 +46,8 @@ MIN_LOOKS_AT_ITEM_LEFT_BEHIND = 2
 FLOOR_POINTS = np.array([(0, 0, 0), (1, 1, 0), (1, -1, 0), (-1, 1, 0), (-1, -1, 0)])
 """Points of a bin's floor that must be visible, in units of half its length and half its width `(5, 3)`."""
 
-BinItems = Mapping[Item, ObjectClass]
-"""Items in a bin and their classes."""
+BinItems = Mapping[Item, tuple[float, float]]
+"""Items in a bin, each with the least and the greatest area of the floor that it may hide [m²]."""
 BinNameByObservation = Mapping[Observation, str | None]
 """Name of the bin in which each observed object lies, or None."""
 
@@ -57,7 +57,7 @@ class BinView:
     """What the last image of a whole bin showed in it; of a new bin: nothing.
 
     Attributes:
-        items: Items in the bin according to the ledger, with their classes.
+        items: Items in the bin according to the ledger.
         area: Area that differs from the floor [m²].
         suspect: A later image that showed more or less than the robot brought, or None.
         change: Sentence on what the suspect image showed, or "".
@@ -150,13 +150,14 @@ class BinContents:
         return max([self.count_objects_in(bin_name), *(slot + 1 for slot in slots if slot is not None)])
 
     def measure_slot_distance(self, record: ItemRecord, observations: Sequence[Observation]) -> float:
-        """Return the distance of the nearest observation from the slot of a placed item [m]; inf if none.
-
-        If the item fell into the bin, the centre of the bin takes the place of the slot.
-        """
-        bin = self.bins[record.bin]
-        slot = bin.position[:2] if record.slot is None else bin.slots[record.slot % len(bin.slots)]
+        """Return the distance of the nearest observation from the slot of a placed item [m]; inf if none."""
+        slot = self.get_slot(record)
         return min((math.dist(slot, entry.position[:2]) for entry in observations), default=math.inf)
+
+    def get_slot(self, record: ItemRecord) -> Array:
+        """Return the slot `(2,)` [m] of an item in a bin; the centre of the bin if the item fell into it."""
+        bin = self.bins[record.bin]
+        return bin.position[:2] if record.slot is None else bin.slots[record.slot % len(bin.slots)]
 
     def find_bin_name(self, observation: Observation, bias_std: float) -> str | None:
         """Return the name of the bin in which an observed object lies, or None.
@@ -236,13 +237,10 @@ class BinContents:
             if area is None or name in target_bins:
                 continue
             records = self.list_records_in(name)
-            items = {record.item: self.classes[record.label] for record in records}
+            items = {record.item: self.predict_area(record, frame.X_WC.position) for record in records}
             view = self.views.setdefault(name, BinView())
             new_view = BinView(items, area)
-            # Tangent of the angle between the line of sight and the vertical.
-            offset = frame.X_WC.position - self.bins[name].position
-            slant = math.hypot(offset[0], offset[1]) / max(offset[2], 1e-3)
-            verb = self.find_change(name, view, new_view, slant, is_whole=is_whole)
+            verb = self.find_change(name, view, new_view, is_whole=is_whole)
             if is_whole and not items and area < self.min_change:
                 self.known_bins.add(name)
             change = f"something {verb} {name}, and the robot did not do it" if verb else ""
@@ -253,7 +251,7 @@ class BinContents:
                 view.suspect = new_view
                 view.change = change
             # An object that the robot brought may hide the difference between the suspect view and its base.
-            is_refuted = view.suspect and self.find_change(name, view.suspect, new_view, slant, is_whole=True)
+            is_refuted = view.suspect and self.find_change(name, view.suspect, new_view, is_whole=True)
             if is_whole and (name in changes or (not change and (is_refuted or not view.suspect))):
                 self.views[name] = new_view
         return changes
@@ -263,13 +261,13 @@ class BinContents:
         """Least change of the visible area that an image proves, if the robot brought nothing [m²]."""
         return MIN_CHANGED_FRACTION * math.pi * min(each.radius for each in self.classes.values()) ** 2
 
-    def find_change(self, bin_name: str, old: BinView, new: BinView, slant: float, *, is_whole: bool) -> str:
+    def find_change(self, bin_name: str, old: BinView, new: BinView, *, is_whole: bool) -> str:
         """Return what happened to something between two views that no item explains; "" for nothing.
 
         If the new view is not whole, it may show less than lies in the bin.
         """
-        added = [predict_area(new.items[item], slant) for item in new.items.keys() - old.items.keys()]
-        removed = [predict_area(old.items[item], slant) for item in old.items.keys() - new.items.keys()]
+        added = [new.items[item] for item in new.items.keys() - old.items.keys()]
+        removed = [old.items[item] for item in old.items.keys() - new.items.keys()]
         # An item on others hides them.
         free_count = max(0, len(self.bins[bin_name].slots) - len(old.items))
         lows = sorted(low for low, _ in added)[:free_count]
@@ -279,6 +277,27 @@ class BinContents:
         if growth > max_growth + (0.0 if added else self.min_change):
             return "came into"
         return "left" if is_whole and growth < min_growth else ""
+
+    def predict_area(self, record: ItemRecord, camera_position: Array) -> tuple[float, float]:
+        """Return the least and the greatest area [m²] of the floor that an item in its bin hides.
+
+        A camera beside the bin, at `camera_position` `(3,)` [m], sees a side of the item, too: of an item
+        near the camera less, and of an item at the far side at least as much as at the centre of the bin,
+        because the wall hides its shadow.
+        """
+        object_class = self.classes[record.label]
+        bin = self.bins[record.bin]
+        height = max(camera_position[2] - bin.position[2], 1e-3)
+        # Tangents of the angle between the line of sight and the vertical.
+        slant = math.dist(camera_position[:2], bin.position[:2]) / height
+        min_slant = min(slant, math.dist(camera_position[:2], self.get_slot(record)) / height)
+        circle_area = math.pi * object_class.radius**2
+        prism_area = object_class.outline_area + object_class.height * slant * 2 * object_class.radius
+        high = min(MAX_AREA_FACTORS[0] * circle_area, MAX_AREA_FACTORS[1] * prism_area)
+        if object_class.flat_top and object_class.footprint is not None:
+            side_area = object_class.height * min_slant * min(object_class.footprint)
+            return MIN_AREA_FACTORS[1] * (object_class.outline_area + side_area), high
+        return MIN_AREA_FACTORS[0] * object_class.outline_area, high
 
     def discard_items_left_behind(self) -> dict[str, str]:
         """Discard placed items that looks show where they were picked, and return a sentence on each."""
@@ -378,23 +397,6 @@ class BinContents:
                 missing = Presence.UNSURE if is_unsure else Presence.GONE
                 presences[item] = Presence.PRESENT if rank >= missing_count else missing
         return presences
-
-
-def predict_area(object_class: ObjectClass, slant: float) -> tuple[float, float]:
-    """Return the least and the greatest area [m²] of a bin's floor that an object in the bin hides.
-
-    `slant` is the tangent of the angle between the line of sight and the vertical: a camera beside the bin
-    sees a side of the object, too.
-    """
-    circle_area = math.pi * object_class.radius**2
-    low = MIN_AREA_FACTORS[0] * object_class.outline_area
-    side_height = object_class.height * slant
-    prism_area = object_class.outline_area + side_height * 2 * object_class.radius
-    high = min(MAX_AREA_FACTORS[0] * circle_area, MAX_AREA_FACTORS[1] * prism_area)
-    if object_class.flat_top and object_class.footprint is not None:
-        side_area = side_height * min(object_class.footprint)
-        low = MIN_AREA_FACTORS[1] * (object_class.outline_area + side_area)
-    return low, high
 
 
 def find_probable_bin(record: ItemRecord) -> str | None:

@@ -154,7 +154,8 @@ def test_looks_show_the_yaws_of_the_objects_if_the_tool_needs_them(
 
 
 def test_the_log_of_the_world_keeps_the_yaws(load: Load, tmp_path: Path) -> None:
-    first, second = FakeDriver(load()), FakeDriver(load(), DriverOptions(seed=5))
+    first = FakeDriver(load())
+    second = FakeDriver(load(), DriverOptions(seed=5))
     first.log_to(tmp_path / "world")
     second.rebuild(tmp_path / "world")
     for each, restored in zip(first.world.objects, second.world.objects, strict=True):

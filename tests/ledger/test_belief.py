@@ -170,7 +170,8 @@ def test_yaws_of_an_unmoved_item_are_averaged_unless_they_contradict(
 
 
 def test_a_move_forgets_the_yaw() -> None:
-    old, new = Yaw(0.1, 0.02, 4), Yaw(0.12, 0.02, 4)
+    old = Yaw(0.1, 0.02, 4)
+    new = Yaw(0.12, 0.02, 4)
     assert measure_yaws(old, new, unmoved=False).yaw == new
     assert measure_yaws(old, None, unmoved=False).yaw is None
 

@@ -143,10 +143,11 @@ def test_a_bin_keeps_the_objects_that_the_robot_brought(boxes: Bench) -> None:
     ("area", "text"),
     [
         (0.0084, ""),
+        (0.0064, ""),
         (0.0048, "something left red_bin, and the robot did not do it"),
         (0.0140, "something came into red_bin, and the robot did not do it"),
     ],
-    ids=["both", "one of two", "three"],
+    ids=["both", "both at the near side", "one of two", "three"],
 )
 def test_the_first_images_of_a_bin_after_placements_show_what_the_robot_brought(
     boxes: Bench, area: float, text: str

@@ -166,7 +166,8 @@ def test_the_outline_of_a_detector_is_preferred_if_it_fits_the_box() -> None:
 @pytest.mark.parametrize("has_depth", [True, False])
 def test_only_a_depth_image_shows_an_object_on_another_one_of_its_colour(has_depth: bool) -> None:
     upper_place = PLACE + np.array([0, 0, 0.05])
-    lower, upper = find_pixels(SQUARE, 0.7), find_pixels(SQUARE, 0.3, upper_place)
+    lower = find_pixels(SQUARE, 0.7)
+    upper = find_pixels(SQUARE, 0.3, upper_place)
     frame = draw((lower, RED), (upper, RED))
     height = np.zeros((480, 640))
     cv2.fillPoly(height, [lower.round().astype(np.int32)], 0.05)
