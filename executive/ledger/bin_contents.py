@@ -299,6 +299,13 @@ class BinContents:
             return MIN_AREA_FACTORS[1] * (object_class.outline_area + side_area), high
         return MIN_AREA_FACTORS[0] * object_class.outline_area, high
 
+    def describe_unseen_bins(self) -> str:
+        """Return a sentence on the bins with items that no image showed completely, or ""."""
+        used_bins = {record.bin for record in self.records.filter_by_state(State.PLACED)}
+        shown_bins = {name for name, view in self.views.items() if view.items}
+        unseen_bins = sorted(used_bins - shown_bins - {""})
+        return f"no image showed all that lies in {', '.join(unseen_bins)}" if unseen_bins else ""
+
     def discard_items_left_behind(self) -> dict[str, str]:
         """Discard placed items that looks show where they were picked, and return a sentence on each."""
         texts = {}

@@ -184,6 +184,12 @@ class ItemRecord:
         is_missed = self.state is State.PHANTOM and self.reason == REASON_NOT_FOUND
         return is_missed and self.belief.removal_probability >= MIN_REMOVAL_PROBABILITY
 
+    def describe_disappearance(self) -> str:
+        """Return a sentence on an item that looks showed and then missed."""
+        place = f"({self.position[0]:.2f}, {self.position[1]:.2f}) m"
+        shown = f"{self.belief.look_count} look(s) showed {self.item} at {place}"
+        return f"{shown}, and later looks missed it: it was taken away, or detected by mistake"
+
     @property
     def known_state(self) -> str:
         """State for skills (`KnownItem.state`) of an item that the mission sorts."""

@@ -278,26 +278,19 @@ class Tracker:
                 self.unexplained.report(f"bin {name}", appearance.contradiction, frame=frame.id)
 
     def set_final_states(self, *, completed: bool) -> None:
-        used_bins = {record.bin for record in self._records.filter_by_state(State.PLACED)}
-        shown_bins = {name for name, view in self._bin_contents.views.items() if view.items}
-        if unseen_bins := sorted(used_bins - shown_bins - {""}):
-            self.assumption_reasons.append(f"no image showed all that lies in {', '.join(unseen_bins)}")
+        assumptions = (self._bin_contents.describe_unseen_bins(), self._load_cell.assumption)
+        self.assumption_reasons += [assumption for assumption in assumptions if assumption]
         for name, view in self._bin_contents.views.items():
             if view.change:
                 self.unexplained.report(f"contents {name}", view.change)
-        if assumption := self._load_cell.assumption:
-            self.assumption_reasons.append(assumption)
         set_final_states(
             self._records, self._certainty, self._explain_skipped_item, self.unknown_labels,
             is_completed=completed,
         )  # fmt: skip
-        missed = [record for record in self._records.all if record.may_have_left]
-        for record in (each for each in missed if each.label not in self.unknown_labels):
-            place = f"({record.position[0]:.2f}, {record.position[1]:.2f}) m"
-            count = record.belief.look_count
-            text = f"{count} look(s) showed {record.item} at {place}, and later looks missed it"
-            reason = "it was taken away, or detected by mistake"
-            self.unexplained.report(f"item {record.item}", f"{text}: {reason}", frame=record.frame_id)
+        for record in self._records.all:
+            if record.may_have_left and record.label not in self.unknown_labels:
+                text = record.describe_disappearance()
+                self.unexplained.report(f"item {record.item}", text, frame=record.frame_id)
 
     def discard_rejected_and_skipped(self) -> None:
         self._records.failed_picks.clear()
@@ -345,8 +338,7 @@ class Tracker:
         return [record.item for record in workspace_items if record not in certain_items]
 
     def find_held_item(self) -> Item | None:
-        held = self._records.filter_by_state(State.HELD)
-        return held[0].item if held else None
+        return next((record.item for record in self._records.filter_by_state(State.HELD)), None)
 
     def is_current(self, frame: Frame) -> bool:
         return self._coverage.is_table_unchanged(frame.change_count)
