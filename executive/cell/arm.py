@@ -86,8 +86,8 @@ class Goal:
 
     def compute_line_start(self, length: float) -> tuple[float, float, float]:
         """Return the position [m] from which a straight line of a length [m] leads to the goal."""
-        x, y, z = (end - length * part for end, part in zip(self.position, self.direction, strict=True))
-        return x, y, z
+        start = np.array(self.position) - length * np.array(self.direction)
+        return (float(start[0]), float(start[1]), float(start[2]))
 
 
 @dataclass(frozen=True)

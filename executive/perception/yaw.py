@@ -161,7 +161,7 @@ def _apply_threshold(distances: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 def _apply_grab_cut(crop: NDArray[np.uint8]) -> NDArray[np.uint8]:
     labels = np.zeros(crop.shape[:2], np.uint8)
-    width, height = (max(1, side - 2 * CROP_MARGIN) for side in crop.shape[1::-1])
+    height, width = np.maximum(np.subtract(crop.shape[:2], 2 * CROP_MARGIN), 1).tolist()
     box = (CROP_MARGIN, CROP_MARGIN, width, height)
     cv2.setRNGSeed(0)  # GrabCut draws random numbers.
     cv2.grabCut(crop, labels, box, np.zeros((1, 65)), np.zeros((1, 65)), 3, cv2.GC_INIT_WITH_RECT)

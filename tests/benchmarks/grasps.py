@@ -132,7 +132,9 @@ class Gantry:
             best = int(turns.argmin())
             candidates.append((float(turns[best]), yaw, pairs.branches[best]))
         # The last joint turns most on the way, so it starts far from its limits.
-        _, self._yaw, self._branch = min(candidates, key=lambda candidate: candidate[0])
+        nearest = min(candidates, key=lambda candidate: candidate[0])
+        self._yaw = nearest[1]
+        self._branch = nearest[2]
         q = self._solve([self._position])[0]
         self._q = q
         self.world.set_joint_positions(q)

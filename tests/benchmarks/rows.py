@@ -56,7 +56,8 @@ def arrange_row(world: World, gap: float, rng: np.random.Generator) -> None:
         InputError: The workspace has no room for the row.
     """
     table = world.config.table
-    low, high = np.array([table.x, table.y]).T
+    low = np.array([table.x[0], table.y[0]])
+    high = np.array([table.x[1], table.y[1]])
     bodies = list(map(int, rng.permutation(sorted(world.labels))))
     for _ in range(MAX_PLACE_ATTEMPTS):
         angle = rng.uniform(0, math.tau)

@@ -126,7 +126,8 @@ def describe_class(label: str, comparisons: Sequence[Comparison], limits: tuple[
     errors = np.array([math.remainder(yaw.angle - true, math.tau / yaw.symmetry) for true, yaw in pairs])
     stds = np.array([yaw.std for _, yaw in pairs])
     errors_deg = np.degrees(np.abs(errors))
-    median, percentile = (float(np.quantile(errors_deg, share)) for share in (0.5, 0.95))
+    median = float(np.quantile(errors_deg, 0.5))
+    percentile = float(np.quantile(errors_deg, 0.95))
     exceeded = {"median": median > limits[0], "95th percentile": percentile > limits[1]}
     return {
         "class": label,
