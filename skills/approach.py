@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from functools import partial
 
-from executive.cell.arm import Goal, Motion, MotionGuard, Task
+from executive.cell.arm import Goal, MotionGuard, Task
 from executive.cell.objects import Target
 from executive.cell.protocols import Cell, Steps
-from executive.cell.tools import CONTACT_SPACING, OVERTRAVEL, GraspPose
+from executive.cell.tools import CONTACT_SPACING, OVERTRAVEL
 from executive.manipulation.grasps import choose_grasp
 from executive.manipulation.motions import MAX_OPENING_CHANGE, follow, plan, wait_for_fingers
 from executive.manipulation.tool_goals import find_max_object_height
@@ -71,7 +71,11 @@ class Approach(Skill):
         # The zero of a load cell drifts; only before the descent, the tool is at rest and certainly empty.
         cell.ledger.record_empty_load(tool.load)
         first_touch_height = 0.0
-        opening_time = self._find_opening_time(cell, grasp, motion)
+        opening_time = math.inf
+        if grasp.opening:
+            # Fingers in a bin open in the middle of the motion, because they have no space there.
+            is_in_bin = any(bin.contains(cell.arm.tool_pose.position) for bin in cell.bins.values())
+            opening_time = cell.clock.now + (motion.duration / 2 if is_in_bin else 0.0)
         if opening_time <= cell.clock.now and tool.opening < grasp.opening - MAX_OPENING_CHANGE:
             # Slow fingers would otherwise come down on the object.
             tool.open(grasp.opening)
@@ -97,19 +101,18 @@ class Approach(Skill):
         start_height = grasp.goal.position[2] + grasp.goal.guarded_length
         slow_height = start_height - grasp.goal.fast_length + EARLY_CONTACT_MARGIN
         expectation = f"was expected at {grasp.contact_height * 1000:.0f} mm"
-        is_touching = tool.touching
-        if not is_touching and grasp.guard == "touch":
+        if not tool.touching:
+            if grasp.guard == "clear":
+                return
             cell.ledger.record_failed_pick(item, found_table=grasp.proves_absence)
             message = f"no contact down to {height * 1000:.0f} mm, {item} {expectation}"
             if not cell.ledger.is_tool_plausible:
                 raise self.failure("implausible", f"{message}, and no pick has succeeded; check the sensor")
             raise self.failure("no_contact", message)
-        if is_touching and (grasp.guard == "clear" or height > start_height + EARLY_CONTACT_MARGIN):
+        if grasp.guard == "clear" or height > start_height + EARLY_CONTACT_MARGIN:
             cell.ledger.invalidate_positions()
             message = f"the tool touched something at {height * 1000:.0f} mm on its way to {item}"
             raise self.failure("blocked", f"{message}, which {expectation}")
-        if not is_touching:
-            return
         if grasp.goal.fast_length and first_touch_height > slow_height:
             # The arm has braked below the contact, so `height` is no height of the object.
             cell.ledger.record_failed_pick(item)
@@ -127,13 +130,3 @@ class Approach(Skill):
             message = f"the top of {item} {expectation}; {measurement.contradiction}"
             raise self.failure("no_contact", message)
         yield  # The control step of the contact already has a high computational load.
-
-    def _find_opening_time(self, cell: Cell, grasp: GraspPose, motion: Motion) -> float:
-        """Return the time [s] at which the fingers open for the grasp; infinite for a tool without fingers.
-
-        Fingers in a bin open in the middle of the motion, because they have no space there.
-        """
-        if not grasp.opening:
-            return math.inf
-        is_in_bin = any(bin.contains(cell.arm.tool_pose.position) for bin in cell.bins.values())
-        return cell.clock.now + (motion.duration / 2 if is_in_bin else 0.0)

@@ -45,10 +45,9 @@ class Grasp(Skill):
             yield from cell.clock.sleep(self.settle)
             yield from wait_for_fingers(cell)
             is_gripping = cell.tool.holding
-            is_holding = is_gripping
             if cell.tool_model.max_opening:
                 measurement = cell.tool_model.measure_grip(cell.classes[self.target.label], cell.tool.opening)
-                is_holding = is_gripping and not measurement.is_miss
+            is_holding = is_gripping and not measurement.is_miss
             if is_holding and cell.tool_model.max_opening:
                 is_holding = cell.ledger.record_measurement(self.target.item, measurement)
         finally:

@@ -21,8 +21,8 @@ class SelectTarget(Skill):
     The skill selects only open items with a valid position and a certain class, if a bin of the class is
     below its quota. The class of an item is certain if the probability of a wrong class, given the error
     rates of the detector, is at most the limit of the cell. The skill chooses the first bin of the class that
-    has a quota and is below this quota; without quotas, the bin with the fewest objects. A deferred item
-    comes after all others (see `Defer`), and before it an item beside which the fingers have no space.
+    has a quota and is below this quota; without quotas, the bin with the fewest objects. Last come
+    deferred items (see `Defer`), and before them items beside which the fingers have no space.
 
     * `shortest_tour` prefers the target with which the travel to all targets, each from the bin of the last
       one, is the shortest.

@@ -43,7 +43,7 @@ MAX_LINK_COUNT = 80
 """Maximum number of links of an arm, up to the flange: the check of each pair of links takes time."""
 MAX_NAME_LENGTH = 200
 """Maximum length of the name of a link or joint [characters]; PyBullet crashes for much longer names."""
-ATTACHED = "tool_"
+ATTACHED_PREFIX = "tool_"
 """Prefix of the names of links and joints of a model that hangs on the link of the tool."""
 MAX_DEPTH = 50
 """Maximum number of elements around an element of a URDF; very deep elements exhaust the stack."""
@@ -191,10 +191,11 @@ class JointChain:
         return float(sum(np.linalg.norm(X.position) for X in (*self.offsets[2:], self.X_nF)))
 
 
+@lru_cache(maxsize=16)
 def read_couplings(urdf: str, joint: str) -> Mapping[str, float]:
     """Return the ratio of the position of each coupled joint of a tool to that of `joint`, which is first.
 
-    The names are those of the model attached to an arm, with the prefix `ATTACHED`.
+    The names are those of the model attached to an arm, with the prefix `ATTACHED_PREFIX`.
 
     Raises:
         InputError: The model has no such joint.
@@ -206,12 +207,12 @@ def read_couplings(urdf: str, joint: str) -> Mapping[str, float]:
         raise InputError(
             f'the model {path.name} has no joint "{joint}"; {suggest_choice(joint, names, "Joints")}'
         )
-    couplings = {ATTACHED + joint: 1.0}
+    couplings = {ATTACHED_PREFIX + joint: 1.0}
     for element in joints:
         mimic = element.find("mimic")
         if mimic is not None and mimic.get("joint") == joint:
             (factor,) = parse_numbers(path, mimic, "multiplier", (1.0,))
-            couplings[ATTACHED + element.get("name", "")] = factor
+            couplings[ATTACHED_PREFIX + element.get("name", "")] = factor
     return couplings
 
 

@@ -119,14 +119,19 @@ class ObjectConfig(Section):
 
     def _derive_yaw_properties(self) -> dict[str, Any]:
         """Return symmetry and offset [rad] of the yaw, derived from the footprint if they are not given."""
-        length, width = self.footprint or (1.0, 1.0)
+        if self.footprint is None:
+            return {"yaw_symmetry": 0}
+        length, width = self.footprint
+        is_square = max(length, width) <= MAX_SQUARE_RATIO * min(length, width)
         symmetry = self.yaw_symmetry
         if symmetry is None:
-            is_square = max(length, width) <= MAX_SQUARE_RATIO * min(length, width)
             is_round = is_square and 2 * self.radius < MAX_ROUND_RATIO * length
-            symmetry = 0 if is_round or not self.footprint else 4 if is_square else 2
-        default_offset = 45.0 if symmetry == 4 else 90.0 if width > length and symmetry in (1, 2) else 0.0
-        offset = default_offset if self.yaw_offset_deg is None else self.yaw_offset_deg
+            symmetry = 4 if is_square else 2
+            symmetry = 0 if is_round else symmetry
+        offset = self.yaw_offset_deg
+        if offset is None:
+            offset = 90.0 if width > length and symmetry in (1, 2) else 0.0
+            offset = 45.0 if symmetry == 4 else offset
         return {"yaw_symmetry": symmetry, "yaw_offset": math.radians(offset)}
 
     @model_validator(mode="after")

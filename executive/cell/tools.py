@@ -241,6 +241,9 @@ class ToolModel(Section):
             target: Place of the object, and its yaw if it is known.
             motion: Heights and speed of guarded motions.
             attempt: The attempt, which may have another grasp than the attempts before.
+
+        Raises:
+            Blocked: The tool needs the yaw of the object, which is unknown.
         """
         raise NotImplementedError(f"{type(self).__name__} does not define `list_grasps`")
 

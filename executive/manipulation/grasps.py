@@ -23,9 +23,10 @@ from executive.errors import Blocked, Fault
 from executive.geometry import Array, Yaw, compute_tool_yaw, make_tool_down_pose
 from executive.manipulation.tool_goals import (
     DROP_HEIGHT,
+    find_layer_thickness,
     list_obstacles,
-    make_bin_goal_at_any_yaw,
     make_obstacle,
+    make_slot_goal,
     predict_next_slot_index,
 )
 
@@ -60,8 +61,6 @@ def choose_grasp(
     )
     object_class = cell.classes[target.label]
     grasps = cell.tool_model.list_grasps(object_class, target, cell.motion, attempt)
-    if not grasps and target.yaw is None and object_class.yaw_symmetry:
-        raise Blocked(f"{target.item} fits between the fingers only at a known yaw, which no image showed")
     if not grasps:
         raise Fault(f'the tool "{cell.tool_model.kind}" lists no grasp of a {target.label}')
     obstacles = list_obstacles(cell, target.item)
@@ -71,7 +70,7 @@ def choose_grasp(
     for grasp in grasps:
         yaws, name = find_free_yaws(cell.tool_model, grasp.opening, grasp.goal, obstacles, bins, margin)
         blocker = blocker or name
-        if yaws is not None:
+        if not name:
             task = Task(obstacles=obstacles, target=make_obstacle(cell, target), opening=grasp.opening)
             return replace(grasp, goal=replace(grasp.goal, yaws=yaws)), task
     raise Blocked(f"the open fingers have no space beside {target.item}: {blocker} is in the way")
@@ -110,15 +109,23 @@ def make_bin_goal(
             something; the message names it.
     """
     object_class = cell.classes[cell.ledger.get_label(item)]
+    slot_index = predict_next_slot_index(cell, bin_name, item)
+    hold_height = cell.tool_model.get_hold_height(object_class)
+    thickness = find_layer_thickness(cell, bin_name)
+    goal = make_slot_goal(cell.bins[bin_name], slot_index, hold_height, thickness, drop_height)
     yaws = _list_place_yaws(cell, bin_name, item, held_yaw)
-    goal = replace(make_bin_goal_at_any_yaw(cell, bin_name, item, drop_height), yaws=yaws)
     opening = cell.tool_model.compute_release_opening(object_class)
     free_yaws, blocker = find_free_yaws(
-        cell.tool_model, opening, goal, list_obstacles(cell, item), cell.bins.values(), cell.motion.margin
+        cell.tool_model,
+        opening,
+        replace(goal, yaws=yaws),
+        list_obstacles(cell, item),
+        cell.bins.values(),
+        cell.motion.margin,
     )
-    if free_yaws is None and yaws:
+    if blocker and yaws:
         raise Blocked(f"the fingers cannot open at the yaw that {bin_name} needs: {blocker} is in the way")
-    return replace(goal, yaws=free_yaws or ())
+    return replace(goal, yaws=free_yaws)
 
 
 def _list_place_yaws(cell: Cell, bin_name: str, item: Item, held_yaw: Yaw | None) -> tuple[float, ...]:
@@ -145,12 +152,12 @@ def find_free_yaws(
     obstacles: Collection[Obstacle],
     bins: Collection[Bin],
     margin: float,
-) -> tuple[tuple[float, ...] | None, str]:
+) -> tuple[tuple[float, ...], str]:
     """Return the permitted yaws of a goal [rad] at which the fingers are clear of obstacles and bin walls.
 
-    The yaws are None if no yaw is free; the name of an obstacle is then the second value. `opening` is the
-    distance between the fingers [m], 0 for a tool without fingers, and `margin` the minimum distance of the
-    fingers from obstacles and walls [m].
+    If no yaw is free, the second value is the name of an obstacle, otherwise "". `opening` is the distance
+    between the fingers [m], 0 for a tool without fingers, and `margin` the minimum distance of the fingers
+    from obstacles and walls [m].
     """
     if not opening:
         return goal.yaws, ""
@@ -159,7 +166,7 @@ def find_free_yaws(
     candidates = goal.yaws or tuple(math.tau * index / YAW_COUNT for index in range(YAW_COUNT))
     blockers = [_find_blocker(goal, parts, yaw, obstacles, bins, distance) for yaw in candidates]
     free_yaws = tuple(yaw for yaw, name in zip(candidates, blockers, strict=True) if not name)
-    return (free_yaws or None), next(filter(None, blockers), "")
+    return free_yaws, "" if free_yaws else blockers[0]
 
 
 def _find_blocker(

@@ -117,10 +117,11 @@ def _list_bin_obstacles(cell: Cell, excluded_item: Item | None) -> Iterator[Obst
     radius = max(object_class.radius for object_class in cell.classes.values()) + MAX_ROLL_DISTANCE
     for bin_name, bin in cell.bins.items():
         next_slot_index = predict_next_slot_index(cell, bin_name, excluded_item)
+        thickness = find_layer_thickness(cell, bin_name)
         for index, (x, y) in enumerate(bin.slots[:next_slot_index]):
             # Objects fill the slots of a layer in order, before the next layer begins.
             layer_count = math.ceil((next_slot_index - index) / len(bin.slots))
-            top = compute_layer_height(bin, layer_count, find_layer_thickness(cell, bin_name))
+            top = compute_layer_height(bin, layer_count, thickness)
             yield Obstacle(float(x), float(y), radius, top, f"the objects in slot {index + 1} of {bin_name}")
 
 
@@ -181,14 +182,6 @@ def explain_uncertain_bin(cell: Cell, bin_name: str, item: Item) -> str:
     )
 
 
-def make_bin_goal_at_any_yaw(cell: Cell, bin_name: str, item: Item, drop_height: float = DROP_HEIGHT) -> Goal:
-    """Return the tool goal at which `item` is `drop_height` [m] above the next slot of a bin."""
-    next_slot_index = predict_next_slot_index(cell, bin_name, item)
-    hold_height = cell.tool_model.get_hold_height(cell.classes[cell.ledger.get_label(item)])
-    thickness = find_layer_thickness(cell, bin_name)
-    return make_slot_goal(cell.bins[bin_name], next_slot_index, hold_height, thickness, drop_height)
-
-
 def make_slot_goal(
     bin: Bin, slot_index: int, hold_height: float, max_object_height: float, drop_height: float = DROP_HEIGHT
 ) -> Goal:
@@ -220,9 +213,8 @@ def make_put_down_goal(cell: Cell, object_class: ObjectClass, drop_height: float
     candidates = ((x + dx, y + dy) for dx, dy in sorted_offsets)
     free_positions = (xy for xy in candidates if _is_free(cell, xy, object_class.radius + MIN_GAP, item))
     hold_height = cell.tool_model.get_hold_height(object_class)
-    parts = cell.tool_model.list_parts(cell.tool_model.compute_grip_opening(object_class))
     # The tips of fingers must not press on the table instead of the object.
-    space = hold_height + min(part.offset for part in parts) - cell.motion.margin
+    space = hold_height + cell.tool_model.list_parts(0.0)[-1].offset - cell.motion.margin
     pressing_distance = min(max(space, 0.0), MAX_PRESSING_DISTANCE)
     goal = Goal(
         (x, y, table_height + hold_height - pressing_distance),

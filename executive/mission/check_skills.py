@@ -296,7 +296,7 @@ def _explain_blocked_slot(config: CellConfig, name: str, label: str) -> str:
     bin = config.bins[name].build_bin(name)
     for index in range(len(bin.slots)):
         goal = make_slot_goal(bin, index, hold_height, config.max_object_height)
-        free_yaws, blocker = find_free_yaws(config.tool, opening, goal, (), (bin,), config.motion.margin)
-        if free_yaws is None:
+        _, blocker = find_free_yaws(config.tool, opening, goal, (), (bin,), config.motion.margin)
+        if blocker:
             return f"fingers cannot open to release a {label} in slot {index + 1}: {blocker} is in the way"
     return ""

@@ -1,4 +1,4 @@
-"""Joint configurations at goals and on vertical lines, and straight motions of the tool between them.
+"""Joint configurations at goals and on straight lines, and straight motions of the tool between them.
 
 The joint path `q(s)` of a straight motion is a polynomial through inverse-kinematics solutions; its parameter
 `s` is the distance that the tool has moved. `q_s`, `q_ss` and `q_sss` are the derivatives of `q` with respect
@@ -53,10 +53,11 @@ _MIN_DIVISOR = 1e-9  # [rad/m], [rad/m²], [rad/m³]: avoids a division by 0 for
 
 @dataclass(frozen=True, eq=False)
 class ConfigurationPairs:
-    """`N` pairs of joint configurations at the two ends of a vertical line of the tool.
+    """`N` pairs of joint configurations at the two ends of a straight line of the tool.
 
     Attributes:
-        upper_qs, lower_qs: Joint positions at the upper and the lower end, `(N, n)` each [rad].
+        upper_qs, lower_qs: Joint positions at the start (the upper end of a descent) and at the goal,
+            `(N, n)` each [rad].
         branches: Branch of the inverse kinematics of each pair.
     """
 

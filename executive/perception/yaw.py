@@ -177,7 +177,8 @@ def _project_outline(outline: Array, frame: Frame, height: float) -> Vertices:
     following = np.roll(vertices, -1)
     doubled_areas = (vertices.conj() * following).imag  # of the triangles of the edges and the origin
     centroid = (doubled_areas * (vertices + following)).sum() / (3 * doubled_areas.sum())
-    return np.asarray((vertices - centroid)[:: 1 if doubled_areas.sum() > 0 else -1])
+    vertices = vertices - centroid
+    return vertices if doubled_areas.sum() > 0 else vertices[::-1]
 
 
 def _compute_yaw(vertices: Vertices, density: float, object_class: ObjectClass) -> Yaw | None:
@@ -202,7 +203,8 @@ def _compute_yaw(vertices: Vertices, density: float, object_class: ObjectClass) 
     axis = np.angle(moment) / order
     if symmetry == 1:
         skewness = _compute_skewness(vertices * np.exp(-1j * axis))
-        axis += math.pi * (skewness < 0)
+        if skewness < 0:
+            axis += math.pi
         symmetry = 1 if abs(skewness) >= MIN_SKEWNESS else 2
     angle = math.remainder(float(axis) - object_class.yaw_offset, math.tau / symmetry)
     return Yaw(angle, moment_std / float(abs(moment)) / order, symmetry)

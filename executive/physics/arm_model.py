@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.arms.urdf import (
-    ATTACHED,
+    ATTACHED_PREFIX,
     JointChain,
     describe_place,
     find_model,
@@ -97,7 +97,7 @@ def _resolve_files(path: Path, robot: Element) -> None:
 def build_attached_links(urdf: str, rotation_deg: Angles) -> str:
     """Return links and joints of a URDF whose base hangs on the link of the tool, turned by `rotation_deg`.
 
-    The names get the prefix `ATTACHED`, because names of the arm may be equal.
+    The names get the prefix `ATTACHED_PREFIX`, because names of the arm may be equal.
     """
     path = find_model(urdf)
     robot = read_robot(path)
@@ -110,16 +110,16 @@ def build_attached_links(urdf: str, rotation_deg: Angles) -> str:
         result.append(_complete_link(path, link, visuals=True))
     for joint in robot.iterfind("joint"):
         for end in (*joint.findall("parent"), *joint.findall("child")):
-            end.set("link", ATTACHED + end.get("link", ""))
+            end.set("link", ATTACHED_PREFIX + end.get("link", ""))
         result.append(joint)
     for element in result:
-        element.set("name", ATTACHED + element.get("name", ""))
+        element.set("name", ATTACHED_PREFIX + element.get("name", ""))
     _resolve_files(path, result)
     for number, material in enumerate(result.iter("material")):
-        material.set("name", f"{ATTACHED}material_{number}")
-    mount = ElementTree.SubElement(result, "joint", name=f"{ATTACHED}mount", type="fixed")
+        material.set("name", f"{ATTACHED_PREFIX}material_{number}")
+    mount = ElementTree.SubElement(result, "joint", name=f"{ATTACHED_PREFIX}mount", type="fixed")
     ElementTree.SubElement(mount, "parent", link=TOOL_LINK)
-    ElementTree.SubElement(mount, "child", link=ATTACHED + bases[0])
+    ElementTree.SubElement(mount, "child", link=ATTACHED_PREFIX + bases[0])
     ElementTree.SubElement(mount, "origin", xyz="0 0 0", rpy=" ".join(map(str, np.radians(rotation_deg))))
     ElementTree.indent(result)  # PyBullet cannot read long lines.
     return "".join(ElementTree.tostring(element, encoding="unicode") for element in result)

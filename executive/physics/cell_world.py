@@ -60,6 +60,7 @@ class CellWorld:
         joint_counts: Number of joints before each link of the arm, by the index of the link; -1: the base.
         has_vertical_axis: True if the axis of the first joint is vertical.
         tool_index: Index of the link of the tool, whose frame is the frame of the flange.
+        tool_links: Indices of all links of the tool.
         tool_joints: Indices of the moving joints of the tool, by name, which are also those of their links.
         table, floor: Bodies of the table and of the floor under the table.
         bin_bodies: Body of each bin, by name.
@@ -99,11 +100,11 @@ class CellWorld:
         counts = {name: count for name, (count, _) in chain.places.items()}
         link_counts = [counts.get(name, len(self.joints)) for name in link_names]
         self.joint_counts = {-1: 0, **dict(enumerate(link_counts))}
-        self._tool_links = {index for index, name in enumerate(link_names) if name not in counts}
+        self.tool_links = [index for index, name in enumerate(link_names) if name not in counts]
         self.tool_joints = {
             name: index
             for index, name in enumerate(joint_names)
-            if index in self._tool_links and infos[index][JOINT_TYPE] != pybullet.JOINT_FIXED
+            if index in self.tool_links and infos[index][JOINT_TYPE] != pybullet.JOINT_FIXED
         }
         self.set_opening(config.tool.max_opening)
         self.bin_bodies = {name: add_bin(self.client, bin) for name, bin in config.bins.items()}
@@ -112,10 +113,6 @@ class CellWorld:
     def find_link(self, name: str) -> int:
         """Return the index of a link of the arm, by its name in the URDF; -1 for the base."""
         return self._link_names.index(name) - 1
-
-    def is_tool(self, link: int) -> bool:
-        """Return True if a link of the arm belongs to the tool, by its index."""
-        return link in self._tool_links
 
     def set_opening(self, opening: float) -> None:
         """Move the fingers of the tool to a distance [m] at once, without physics."""
@@ -128,7 +125,7 @@ class CellWorld:
 
     def name_link(self, link: int) -> str:
         """Return the name of a link of the arm for messages, by its index."""
-        if self.is_tool(link):
+        if link in self.tool_links:
             return "the tool"
         count = self.joint_counts[link]
         return f"link {count}" if count else "the base of the arm"

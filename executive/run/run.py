@@ -19,12 +19,7 @@ from executive.errors import Blocked, Fault, Interrupted, Stopped, describe_erro
 from executive.events import Event, Observer, RunEnded, RunStarted, TimedEvent
 from executive.ledger.final_states import is_balanced
 from executive.ledger.tracker import Tracker
-from executive.manipulation.grasps import (
-    choose_grasp,
-    explain_blocked_grasp,
-    make_bin_goal,
-    measure_held_yaw,
-)
+from executive.manipulation.grasps import choose_grasp, make_bin_goal, measure_held_yaw
 from executive.manipulation.motions import make_transport_task
 from executive.manipulation.tool_goals import sort_by_tour, sort_pickable_targets
 from executive.processes import shorten_collections
@@ -430,12 +425,11 @@ class LookaheadPlanner:
         elif self._change_tick not in (None, tick) and self._held_item and self._is_moving_to_bin():
             self._change_tick = None
             pickable_targets = sort_pickable_targets(cell, cell.ledger.find_targets())
-            targets = [
-                each for each in sort_by_tour(cell, pickable_targets) if not explain_blocked_grasp(cell, each)
-            ]
-            if targets:
-                grasp, task = choose_grasp(cell, targets[0])
-                cell.arm.plan_ahead(grasp.goal, task)
+            for target in sort_by_tour(cell, pickable_targets):
+                with suppress(Blocked):
+                    grasp, task = choose_grasp(cell, target)
+                    cell.arm.plan_ahead(grasp.goal, task)
+                    break
 
     def _is_moving_to_bin(self) -> bool:
         destination = self._cell.arm.destination

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
@@ -16,6 +17,7 @@ from executive.cell.arm import Goal
 from executive.cell.device_config import Angles, Distance, Force, Length, MotionConfig, Section
 from executive.cell.objects import ObjectClass, Target
 from executive.cell.tools import GraspAttempt, GraspPose, ToolMeasurement, ToolModel, ToolPart
+from executive.errors import Blocked
 from executive.geometry import Yaw
 
 if TYPE_CHECKING:
@@ -129,15 +131,11 @@ class Fingers(ToolModel):
     @property
     def parts(self) -> tuple[ToolPart, ...]:
         """The palm; none with a model, which has its own shapes."""
-        return () if self.model else (self._palm_part,)
-
-    @property
-    def _palm_part(self) -> ToolPart:
-        return ToolPart.make_box(self.palm_offset, self.length - self.palm_offset, self.palm)
+        return () if self.model else (self.list_parts(self.stroke)[0],)
 
     def list_parts(self, opening: float) -> Sequence[ToolPart]:
         """Return palm and fingers; the fingers are fully open at the opening 0."""
-        parts = [self._palm_part]
+        parts = [ToolPart.make_box(self.palm_offset, self.length - self.palm_offset, self.palm)]
         for offset, length, thickness in self._finger_boxes:
             sides = (self.finger[0], thickness)
             place = ((opening or self.stroke) + thickness) / 2
@@ -182,10 +180,8 @@ class Fingers(ToolModel):
 
     def compute_joint_positions(self, opening: float) -> Mapping[str, float]:
         """Return the positions at an opening [m]; at the opening 0, the fingers are fully open."""
-        openings = [entry[1] for entry in self.opening_table]
-        order = np.argsort(openings)
-        positions = np.array([entry[0] for entry in self.opening_table])
-        position = float(np.interp(opening or self.stroke, np.array(openings)[order], positions[order]))
+        table = np.array(sorted((opening, position) for position, opening in self.opening_table))
+        position = float(np.interp(opening or self.stroke, table[:, 0], table[:, 1]))
         return {name: factor * position for name, factor in self.couplings.items()}
 
     @property
@@ -264,7 +260,8 @@ class Fingers(ToolModel):
         start_height = bottom + object_class.height + self.tip + clearance
         yaw = target.yaw
         if not yaw and 2 * object_class.radius + 2 * MIN_ALLOWANCE > self.stroke:
-            return []
+            cause = "fits between the fingers only at a known yaw, which no image showed"
+            raise Blocked(f"{target.item} {cause}")
         grasps = []
         widths = self._list_widths(object_class) if yaw else [(2 * object_class.radius, ())]
         for width, directions in widths:
@@ -281,7 +278,7 @@ class Fingers(ToolModel):
                 guarded_speed=self.descent_speed,
             )
             opening = min(opening, self.stroke)
-            grasps.append(GraspPose(goal, end_height, guard="clear", opening=opening, proves_absence=True))
+            grasps.append(GraspPose(goal, end_height, guard="clear", opening=opening))
         return grasps
 
     def compute_held_yaw(self, yaw: Yaw, tool_yaw: float) -> Yaw:
@@ -312,16 +309,13 @@ class Fingers(ToolModel):
     def find_distinct_labels(self, classes: Mapping[str, ObjectClass]) -> Collection[str]:
         """Return the classes whose widths at a grip overlap with those of no other class."""
         ranges = {label: self._list_grip_ranges(object_class) for label, object_class in classes.items()}
-
-        def is_distinct(label: str) -> bool:
-            others = [pair for other, pairs in ranges.items() if other != label for pair in pairs]
-            return not any(
-                low <= other_high and other_low <= high
-                for low, high in ranges[label]
-                for other_low, other_high in others
-            )
-
-        return frozenset(label for label in classes if is_distinct(label))
+        overlapping_labels = {
+            label
+            for label, other in itertools.permutations(classes, 2)
+            for (low, high), (other_low, other_high) in itertools.product(ranges[label], ranges[other])
+            if low <= other_high and other_low <= high
+        }
+        return classes.keys() - overlapping_labels
 
     def _list_widths(self, object_class: ObjectClass) -> list[tuple[float, tuple[float, ...]]]:
         """Return the widths of an object between the fingers [m], with the yaws of the tool relative to it.

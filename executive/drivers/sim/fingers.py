@@ -31,9 +31,10 @@ before the sensor reports a loss."""
 MIN_WIDTH = 0.002
 """Minimum distance of the fingers at a grip beyond that of the closed fingers [m]."""
 MAX_CLOSING = 0.005
-"""Maximum distance by which fingers close on an object that shifts between them, without pressing [m]."""
-MIN_FORCE_FRACTION = 0.5
-"""Minimum force of a finger at a grip, as a fraction of the declared force."""
+"""Maximum distance by which fingers close without pressing on an object that shifts between them [m]; if they
+close further, they have lost it."""
+MIN_EFFORT_FRACTION = 0.5
+"""Minimum effort of the motor at a grip, as a fraction of the declared effort."""
 MIN_TOUCH_FORCE = 2.0
 """Minimum force of a detected contact [N], as of the sensors in the joints of the arm."""
 LOAD_SMOOTHING = 0.1
@@ -105,7 +106,7 @@ class SimFingers:
         table = np.array(sorted(model.opening_table))
         self._positions = table[:, 0]
         self._openings = table[:, 1]
-        self._links = [link for link in world.joint_counts if world.is_tool(link)]
+        self._links = world.tool_links
         self._is_closing = False
         self._pressing_time = 0.0
         self._grip_opening = 0.0
@@ -190,12 +191,13 @@ class SimFingers:
         self._load += LOAD_SMOOTHING * (upward_force - self._weight - self._load)
         if not self._is_closing:
             return
-        is_pressing = (
-            self.opening > self._model.closed + MIN_WIDTH
-            and self._measure_force() >= MIN_FORCE_FRACTION * self._model.force
-        )
+        opening = self.opening
+        min_opening = self._model.closed + MIN_WIDTH
+        effort = abs(self._world.client.getJointState(self._world.arm, self._joints[0])[3])
+        is_pressing = opening > min_opening and effort >= MIN_EFFORT_FRACTION * self._model.effort
         if is_pressing:
-            self._grip_opening = self.opening
+            self._grip_opening = opening
+        loss_opening = max(self._grip_opening - MAX_CLOSING, min_opening)
         change = STEP if is_pressing else -STEP
         self._pressing_time = min(max(self._pressing_time + change, 0.0), SENSOR_TIME)
         if not self.holding and self._pressing_time >= SENSOR_TIME:
@@ -203,15 +205,11 @@ class SimFingers:
             self.held_body = self._find_body_between()
             if self.held_body is not None:
                 self.dropped_bodies.discard(self.held_body)
-        elif self.holding and self._pressing_time <= 0 and self.opening < self._get_loss_opening():
+        elif self.holding and self._pressing_time <= 0 and opening < loss_opening:
             self.holding = False
             if self.held_body is not None:
                 self.dropped_bodies.add(self.held_body)
             self.held_body = None
-
-    def _get_loss_opening(self) -> float:
-        """Return the distance between the fingers below which they have lost the object [m]."""
-        return max(self._grip_opening - MAX_CLOSING, self._model.closed + MIN_WIDTH)
 
     def _command(self, opening: float) -> None:
         """Move the fingers to a distance [m] with the declared force and speed."""
@@ -235,11 +233,6 @@ class SimFingers:
                 targetVelocity=factor * velocity, positionGain=COUPLING_GAIN, velocityGain=0.3,
                 force=COUPLING_EFFORT,
             )  # fmt: skip
-
-    def _measure_force(self) -> float:
-        """Return the force of a finger [N], from the effort of the motor."""
-        effort = float(self._world.client.getJointState(self._world.arm, self._joints[0])[3])
-        return abs(effort) / self._model.effort * self._model.force
 
     def _find_body_between(self) -> int | None:
         """Return the loose body on which the fingers press most, or None."""
