@@ -114,6 +114,15 @@ class Fingers(ToolModel):
             raise ValueError(f"needs a stroke above the distance of the closed fingers, {self.closed:g} m")
         if self.finger[2] - self.tip >= self.length:
             raise ValueError(f"needs fingers that are shorter than its length, {self.length:g} m")
+        openings = [opening for _, opening in sorted(self.opening_table)]
+        if openings not in (sorted(openings), sorted(openings, reverse=True)):
+            raise ValueError(
+                "needs model.openings that only grow or only fall with the position of the joint"
+            )
+        if (min(openings), max(openings)) != (self.closed, self.stroke):
+            raise ValueError(
+                f"needs model.openings from {self.closed:g} m, as closed, to {self.stroke:g} m, as stroke"
+            )
         if self.palm_offset <= (self.root[0] if self.root else 0.0):
             raise ValueError("needs fingers that are longer than their tips below the root")
         return self
@@ -187,7 +196,9 @@ class Fingers(ToolModel):
     @property
     def opening_table(self) -> tuple[tuple[float, float], ...]:
         """Positions of the first joint of `couplings`, each with the distance between the fingers [m]."""
-        return self.model.openings if self.model else ((self.stroke / 2, self.stroke), (0.0, 0.0))
+        if self.model is not None:
+            return self.model.openings
+        return ((self.stroke / 2, self.stroke), (self.closed / 2, self.closed))
 
     @property
     def effort(self) -> float:

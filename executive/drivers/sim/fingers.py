@@ -45,12 +45,6 @@ class FingerTool(Protocol):
     """Properties of a tool with fingers, as in `executive.tools.fingers.Fingers`."""
 
     @property
-    def stroke(self) -> float: ...
-
-    @property
-    def closed(self) -> float: ...
-
-    @property
     def force(self) -> float: ...
 
     @property
@@ -126,7 +120,8 @@ class SimFingers:
         client.enableJointForceTorqueSensor(world.arm, world.tool_index, True)
         masses = [client.getDynamicsInfo(world.arm, link)[0] for link in self._links]
         self._weight = sum(masses) * GRAVITY
-        self._command(model.stroke)
+        self._closed_opening = float(self._openings.min())
+        self._command(float(self._openings.max()))
 
     @property
     def opening(self) -> float:
@@ -160,7 +155,7 @@ class SimFingers:
         self._world.log_command(world_log.CLOSE)
         self._end_separation()
         self._is_closing = True
-        self._command(self._model.closed)
+        self._command(self._closed_opening)
 
     def open(self, opening: float = 0.0) -> None:
         self._world.log_command(world_log.OPEN, opening)
@@ -168,8 +163,7 @@ class SimFingers:
         if body is not None:
             self._world.rest_positions.setdefault(body, []).append(self._world.get_object_pose(body).position)
         if opening or self._is_closing:
-            released = self.opening + 2 * self._model.release_allowance
-            self._command(min(opening or released, self._model.stroke))
+            self._command(opening or self.opening + 2 * self._model.release_allowance)
         self._is_closing = False
         self._pressing_time = 0.0
         self.holding = False
@@ -192,7 +186,7 @@ class SimFingers:
         if not self._is_closing:
             return
         opening = self.opening
-        min_opening = self._model.closed + MIN_WIDTH
+        min_opening = self._closed_opening + MIN_WIDTH
         effort = abs(self._world.client.getJointState(self._world.arm, self._joints[0])[3])
         is_pressing = opening > min_opening and effort >= MIN_EFFORT_FRACTION * self._model.effort
         if is_pressing:
