@@ -55,7 +55,7 @@ class Grasp(Skill):
             if not is_holding:
                 cell.tool.open()
         if not is_holding:
-            cell.ledger.record_failed_pick(self.target.item, found_table=measurement.is_miss)
+            cell.ledger.record_failed_pick(self.target.item)
             message = f"no {noun} on {self.target.item} {self.settle:.2f} s after contact"
             if is_gripping and measurement.contradiction:
                 message = f"{self.target.item} may be no {self.target.label}: {measurement.contradiction}"
