@@ -37,6 +37,11 @@ MIN_EFFORT_FRACTION = 0.5
 """Minimum effort of the motor at a grip, as a fraction of the declared effort."""
 MIN_TOUCH_FORCE = 2.0
 """Minimum force of a detected contact [N], as of the sensors in the joints of the arm."""
+STALLED_STEP_COUNT = 4
+"""Number of physics steps without motion after which the motor tries to move with `PRESSING_SPEED`."""
+PRESSING_SPEED = 0.5
+"""Speed of a finger that presses [m/s]. The solver reaches the force of a motor that an object stops only if
+the motor is much faster: with 0.02 m/s, it reached 6 N of 20 N."""
 LOAD_SMOOTHING = 0.1
 """Weight of the newest step in the low-pass filter of the load; the time constant is 40 ms."""
 
@@ -105,6 +110,7 @@ class SimFingers:
         self._pressing_time = 0.0
         self._grip_opening = 0.0
         """Distance between the fingers when they pressed last [m]."""
+        self._stalled_step_count = 0
         self._load = 0.0
         self._separated_body: int | None = None
         client = world.client
@@ -121,7 +127,9 @@ class SimFingers:
         masses = [client.getDynamicsInfo(world.arm, link)[0] for link in self._links]
         self._weight = sum(masses) * GRAVITY
         self._closed_opening = float(self._openings.min())
-        self._command(float(self._openings.max()))
+        self._min_speed = self._convert_speed(model.speed) / 2
+        """Minimum speed of the first joint in a motion [m/s or rad/s]."""
+        self._command(float(self._openings.max()), model.speed)
 
     @property
     def opening(self) -> float:
@@ -155,7 +163,9 @@ class SimFingers:
         self._world.log_command(world_log.CLOSE)
         self._end_separation()
         self._is_closing = True
-        self._command(self._closed_opening)
+        self._stalled_step_count = 0
+        self._grip_opening = 0.0
+        self._command(self._closed_opening, self._model.speed)
 
     def open(self, opening: float = 0.0) -> None:
         self._world.log_command(world_log.OPEN, opening)
@@ -163,7 +173,7 @@ class SimFingers:
         if body is not None:
             self._world.rest_positions.setdefault(body, []).append(self._world.get_object_pose(body).position)
         if opening or self._is_closing:
-            self._command(opening or self.opening + 2 * self._model.release_allowance)
+            self._command(opening or self.opening + 2 * self._model.release_allowance, self._model.speed)
         self._is_closing = False
         self._pressing_time = 0.0
         self.holding = False
@@ -187,7 +197,15 @@ class SimFingers:
             return
         opening = self.opening
         min_opening = self._closed_opening + MIN_WIDTH
-        effort = abs(self._world.client.getJointState(self._world.arm, self._joints[0])[3])
+        _, velocity, _, effort = self._world.client.getJointState(self._world.arm, self._joints[0])
+        effort = abs(effort)
+        # The fingers tremble while they push, but do not close further unless they lose the object.
+        is_pushing = self._stalled_step_count >= STALLED_STEP_COUNT
+        is_moving = (
+            opening < self._grip_opening - MAX_CLOSING if is_pushing else abs(velocity) > self._min_speed
+        )
+        self._stalled_step_count = 0 if is_moving else self._stalled_step_count + 1
+        self._command(self._closed_opening, PRESSING_SPEED if is_pushing else self._model.speed)
         is_pressing = opening > min_opening and effort >= MIN_EFFORT_FRACTION * self._model.effort
         if is_pressing:
             self._grip_opening = opening
@@ -205,16 +223,17 @@ class SimFingers:
                 self.dropped_bodies.add(self.held_body)
             self.held_body = None
 
-    def _command(self, opening: float) -> None:
-        """Move the fingers to a distance [m] with the declared force and speed."""
-        model = self._model
+    def _convert_speed(self, speed: float) -> float:
+        """Return the mean speed of the first joint [m/s or rad/s] at a speed of each finger [m/s]."""
+        return 2 * speed * float(np.ptp(self._positions) / np.ptp(self._openings))
+
+    def _command(self, opening: float, speed: float) -> None:
+        """Move the fingers to a distance [m], each with a speed [m/s], with the declared force."""
         order = np.argsort(self._openings)
         position = float(np.interp(opening, self._openings[order], self._positions[order]))
-        # Both fingers move, so their distance changes with twice the speed of a finger.
-        speed = 2 * model.speed * float(np.ptp(self._positions) / np.ptp(self._openings))
         self._world.client.setJointMotorControl2(
             self._world.arm, self._joints[0], pybullet.POSITION_CONTROL, targetPosition=position,
-            force=model.effort, maxVelocity=speed,
+            force=self._model.effort, maxVelocity=self._convert_speed(speed),
         )  # fmt: skip
 
     def _move_coupled_joints(self) -> None:
