@@ -198,7 +198,7 @@ def read_couplings(urdf: str, joint: str) -> Mapping[str, float]:
     The names are those of the model attached to an arm, with the prefix `ATTACHED_PREFIX`.
 
     Raises:
-        InputError: The model has no such joint.
+        InputError: The model has no such joint, or a coupled joint has no limits.
     """
     path = find_model(urdf)
     joints = read_robot(path).findall("joint")
@@ -207,13 +207,19 @@ def read_couplings(urdf: str, joint: str) -> Mapping[str, float]:
         raise InputError(
             f'the model {path.name} has no joint "{joint}"; {suggest_choice(joint, names, "Joints")}'
         )
-    couplings = {ATTACHED_PREFIX + joint: 1.0}
+    factors = {joint: 1.0}
     for element in joints:
         mimic = element.find("mimic")
         if mimic is not None and mimic.get("joint") == joint:
-            (factor,) = parse_numbers(path, mimic, "multiplier", (1.0,))
-            couplings[ATTACHED_PREFIX + element.get("name", "")] = factor
-    return couplings
+            (factors[element.get("name", "")],) = parse_numbers(path, mimic, "multiplier", (1.0,))
+    for element in joints:
+        name = element.get("name", "")
+        has_limits = element.get("type") in ("revolute", "prismatic") and element.find("limit") is not None
+        if name in factors and not has_limits:
+            raise InputError(
+                f'the joint "{name}" of {path.name} must be revolute or prismatic, with a <limit>'
+            )
+    return {ATTACHED_PREFIX + name: factor for name, factor in factors.items()}
 
 
 def locate_flange(flange: FlangeConfig) -> Pose:

@@ -6,7 +6,7 @@ import itertools
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field, GetJsonSchemaHandler, model_validator
@@ -187,6 +187,10 @@ class ToolModel(Section):
             return handler(schema)
         kinds = [handler(model.__pydantic_core_schema__) for model in load_tool_models().values()]
         return kinds[0] if len(kinds) == 1 else {"anyOf": kinds}
+
+    def replace_paths(self, _resolve: Callable[..., str]) -> Self:
+        """Return this section with absolute paths, each made of a path and its keys in this section."""
+        return self
 
     @property
     def parts(self) -> Sequence[ToolPart]:

@@ -334,7 +334,8 @@ def _resolve_model_files(
         mesh = resolve(model.mesh, "objects", label, "mesh")
         objects[label] = model.model_copy(update={"urdf": urdf, "mesh": mesh})
     arm = config.arm.model_copy(update={"urdf": resolve(config.arm.urdf, "arm", "urdf")})
-    return config.model_copy(update={"objects": objects, "arm": arm}), errors, models
+    tool = config.tool.replace_paths(lambda path, *keys: resolve(path, "tool", *keys))
+    return config.model_copy(update={"objects": objects, "arm": arm, "tool": tool}), errors, models
 
 
 MAX_OVERLAP = 0.0005

@@ -93,6 +93,10 @@ POINTS_PER_SIDE = 9
 """Number of positions of the flattest object along each side of the workspace for the check of occlusion."""
 DIFFERENTIATION_STEP = 1e-5
 """Step of a joint for the numerical derivative of the height of the tool [rad]."""
+MAX_FINGER_DISTANCE = 0.5
+"""Maximum distance of a finger from the tool centre point [m]."""
+MAX_FINGER_ERROR = 0.003
+"""Maximum difference between the place of a finger in the model and in the section of the tool [m]."""
 MAX_KINEMATICS_ERROR = 1e-4
 """Maximum difference between the kinematics of the solver and of the model, in position [m] and rotation."""
 
@@ -113,7 +117,14 @@ def find_pose_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     if model_errors := tuple(find_arm_model_errors(config.arm)):
         yield from model_errors
         return
-    with contextlib.closing(ClearanceChecker(config)) as checker:
+    try:
+        config.tool.compute_joint_positions(0.0)
+        checker = ClearanceChecker(config)
+    except InputError as error_of_tool:
+        yield ("tool", "model"), str(error_of_tool)
+        return
+    with contextlib.closing(checker):
+        yield from _find_wrong_openings(config, checker.world)
         if error := _describe_wrong_solver(config, checker.world):
             yield ("arm", "solver"), error
             return
@@ -129,6 +140,28 @@ def find_pose_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
             if any(checker.world.joint_counts[point[LINK_A]] == 0 for point in points):
                 yield ("arm", "base"), f'the base of the arm stands in the bin "{name}"; move one of them'
         yield from _find_occluding_poses_and_bins(config, checker.world)
+
+
+def _find_wrong_openings(config: CellConfig, world: CellWorld) -> Iterator[tuple[KeyPath, str]]:
+    """Yield key and message if fingers are elsewhere than at the distance that their tool section declares.
+
+    Two rays measure the distance, from the tool centre point along the y axis of the tool in both directions.
+    """
+    X_WT = world.get_tool_pose()
+    start = X_WT.position.tolist()
+    ends = X_WT.apply(np.array([[0.0, -MAX_FINGER_DISTANCE, 0.0], [0.0, MAX_FINGER_DISTANCE, 0.0]])).tolist()
+    max_opening = config.tool.max_opening
+    for opening in (max_opening, 0.75 * max_opening, 0.5 * max_opening):
+        world.set_opening(opening)
+        hits = world.client.rayTestBatch([start, start], ends)
+        distances = [hit[2] * MAX_FINGER_DISTANCE for hit in hits]
+        if max_opening and max(abs(each - opening / 2) for each in distances) > MAX_FINGER_ERROR:
+            places = " and ".join(
+                f"{each * 1000:.0f} mm" if each < MAX_FINGER_DISTANCE else "nothing" for each in distances
+            )
+            message = f"with {opening * 1000:.0f} mm between its fingers, the model has {places} beside"
+            yield ("tool", "model"), f"{message} the tool centre point along y, not {opening * 500:.0f} mm"
+            return
 
 
 def find_payload_errors(

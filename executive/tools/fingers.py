@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from string import Template
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -127,6 +127,13 @@ class Fingers(ToolModel):
             raise ValueError("needs fingers that are longer than their tips below the root")
         return self
 
+    def replace_paths(self, resolve: Callable[..., str]) -> Self:
+        """Return this section with the absolute path of the model."""
+        if self.model is None:
+            return self
+        model = self.model.model_copy(update={"urdf": resolve(self.model.urdf, "model", "urdf")})
+        return self.model_copy(update={"model": model})
+
     @property
     def max_opening(self) -> float:
         """Distance between the open fingers [m]."""
@@ -235,11 +242,14 @@ class Fingers(ToolModel):
         if width + 2 * MIN_ALLOWANCE > self.stroke:
             needed = f"{(width + 2 * MIN_ALLOWANCE) * 1000:.0f} mm"
             return f"a {label} needs an opening of {needed}, and the fingers open {self.stroke * 1000:.0f} mm"
-        if width <= self.closed:
-            closed = f"the fingers close to {self.closed * 1000:.0f} mm"
-            return f"a {label} is {width * 1000:.0f} mm wide, and {closed}"
-        if object_class.height < MIN_TIP_HEIGHT + MIN_OVERLAP:
-            return f"a {label} is {object_class.height * 1000:.0f} mm high, too low for the fingers"
+        low, high = max(self._list_grip_ranges(object_class))
+        if high <= self.closed + MIN_GRIP_WIDTH or low > self.stroke:
+            closed = f"the fingers hold {self.closed * 1000:.0f} to {self.stroke * 1000:.0f} mm"
+            return f"a {label} is {low * 1000:.0f} to {high * 1000:.0f} mm wide in the fingers, and {closed}"
+        tip_height = self.get_hold_height(object_class) - self.tip
+        if object_class.height < tip_height + MIN_OVERLAP:
+            height = f"a {label} is {object_class.height * 1000:.0f} mm high"
+            return f"{height}, too low for tips {tip_height * 1000:.0f} mm above its underside"
         return ""
 
     def get_hold_height(self, object_class: ObjectClass) -> float:

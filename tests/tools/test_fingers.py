@@ -8,23 +8,29 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from at_hand import look
 from at_terminal import invoke
 
 from executive.cell.config import CellConfig
 from executive.cell.device_config import STEP, MotionConfig
 from executive.cell.objects import ObjectClass, Target
-from executive.cell.tools import GraspAttempt
+from executive.cell.tools import GraspAttempt, ToolMeasurement
 from executive.drivers.sim.fingers import SimFingers
 from executive.drivers.sim.world import World
 from executive.geometry import GRAVITY, Pose, Yaw, rotate_about_z
+from executive.ledger.final_states import MIN_EMPTY_PROBES
 from executive.manipulation.grasps import choose_grasp
 from executive.mission.cell_file import load_cell
 from executive.motion.joints import build_kinematics
+from executive.physics.cell_world import NORMAL_FORCE
 from executive.testing.fake_cell import FakeCell
 from executive.testing.faults import during, grip_fails, grip_lost
 from executive.testing.run_mission import run_mission
+from executive.testing.run_skill import run_skill
 from executive.tools.fingers import Fingers
+from skills.approach import Approach
+from skills.grasp import Grasp
 from tests.motion.joint_states import reach
 
 TOOL = Fingers(
@@ -90,6 +96,8 @@ def test_tips_stay_above_the_table_and_the_palm_above_the_object(height: float) 
         ({}, ""),
         ({"footprint": (0.105, 0.105), "radius": 0.08}, "a cube needs an opening of 113 mm"),
         ({"height": 0.006}, "a cube is 6 mm high, too low"),
+        ({"grip_height": 0.06}, "a cube is 50 mm high, too low"),
+        ({"grip_widths": (0.2, 0.3)}, "a cube is 200 to 300 mm wide in the fingers"),
     ],
 )
 def test_an_object_that_fits_between_no_fingers_is_unsuitable(changes, text) -> None:
@@ -178,6 +186,19 @@ def test_an_object_slips_just_above_the_limit_of_friction(config, factor: float,
     assert bool(bench.world.get_object_pose(bench.body).position[2] > 0.1) is is_held
 
 
+def test_slow_fingers_press_with_the_declared_force(config: CellConfig) -> None:
+    tool = config.tool.model_copy(update={"speed": 0.02, "force": 40.0})
+    bench = Bench(config.model_copy(update={"tool": tool}), "cube")
+    bench.tool.close()
+    bench.steps(720)
+    points = [
+        point
+        for link in bench.world.tool_links
+        for point in bench.world.client.getContactPoints(bench.world.arm, bench.body, link, -1)
+    ]
+    assert sum(point[NORMAL_FORCE] for point in points) == pytest.approx(80.0, rel=0.1)
+
+
 def test_a_loss_is_detected_within_a_tenth_of_a_second(config: CellConfig) -> None:
     bench = Bench(config, "cube")
     bench.lift()
@@ -216,6 +237,62 @@ def test_check_names_a_slot_in_which_the_fingers_cannot_open() -> None:
     result = invoke("check", "sort_overhead", "--cell", "iiwa_wsg50", "--set", slots)
     assert result.exit_code == 2
     assert "cannot open to release a cube in slot 1: the wall of red_bin is in the way" in result.output
+
+
+BOX = "<collision><origin xyz='{0}'/><geometry><box size='{1}'/></geometry></collision>"
+FINGER = "<link name='{0}'>" + BOX.format("0 {1}0.006 0.165", "0.02 0.012 0.09") + "</link>"
+JOINT = "<joint name='{0}' type='prismatic'><parent link='b'/><child link='{1}'/><axis xyz='{2}'/>{3}</joint>"
+LIMIT = "<limit lower='0' upper='0.055' effort='20' velocity='0.1'/>"
+GRIPPER = (
+    "<robot name='g'><link name='b'>" + BOX.format("0 0 0.05", "0.05 0.11 0.1") + "</link>"
+    + FINGER.format("l", "") + FINGER.format("r", "-")
+    + JOINT.format("motor", "l", "0 1 0", LIMIT)
+    + JOINT.format("gear", "r", "0 -1 0", LIMIT + "<mimic joint='motor'/>") + "</robot>"
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "text"),
+    [
+        ("", "", ""),
+        ("'motor' type='prismatic'", "'motor' type='fixed'", 'the joint "motor" of gripper.urdf must be'),
+        (LIMIT + "<mimic", "<mimic", 'the joint "gear" of gripper.urdf must be'),
+        ("<mimic joint='motor'/>", "", "the model has 0 mm and 55 mm beside"),
+        ("0 1 0", "1 0 0", "the model has 55 mm and nothing beside"),
+        ("0 0.006 0.165", "0 0.026 0.165", "the model has 55 mm and 75 mm beside"),
+        ("motor", "engine", 'no joint "motor"'),
+    ],
+)
+def test_check_compares_the_model_of_a_gripper_with_its_section(
+    old, new, text, missions: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "gripper.urdf").write_text(GRIPPER.replace(old, new))
+    tool = yaml.safe_load((missions / "cells" / "iiwa_wsg50.yaml").read_text())["tool"]
+    openings = [[0.0, 0.0], [0.055, 0.11]]
+    model = {"urdf": "gripper.urdf", "joint": "motor", "openings": openings, "effort": 20.0}
+    cell = tmp_path / "cell.yaml"
+    cell.write_text(
+        yaml.safe_dump({"tool": {**tool, "model": model}, "base": "iiwa_wsg50.yaml", "cell": "own"})
+    )
+    result = invoke("check", "sort_overhead", "--cell", str(cell))
+    assert text in result.output.replace("\n", " ")
+    assert result.exit_code == (2 if text else 0)
+    assert ("cell.yaml:" in result.output) is bool(text)
+
+
+def test_closed_fingers_do_not_prove_that_nothing_is_there(fake_fingers: FakeCell) -> None:
+    for y in (0.0, 0.15):
+        fake_fingers.world.put("cube", 0.5, y)
+    fake_fingers.tool.can_hold = lambda: False
+    for _ in range(MIN_EMPTY_PROBES):
+        target = look(fake_fingers)[0]
+        run_skill(Approach(target=target), fake_fingers)
+        assert run_skill(Grasp(target=target), fake_fingers).reason == "missed"
+    look(fake_fingers)
+    fake_fingers.ledger.record_measurement("cube-2", ToolMeasurement())
+    fake_fingers.ledger.reject(target.item, "could not be picked")
+    fake_fingers.ledger.set_final_states(completed=True)
+    assert fake_fingers.ledger.count_states()["phantom"] == 0
 
 
 def test_a_rehearsal_sorts_with_fingers_and_their_faults_have_their_wording(missions: Path) -> None:
