@@ -97,7 +97,7 @@ class ObjectConfig(Section):
     """Distance of the contact point from the centre [m]; above 0 only for parts with a hole."""
     friction: float = Field(0.5, ge=0.01, le=5)
     """Coefficient of friction of the surface, for tools that hold by friction; its product with that of the
-    pads counts. A simulation uses the value in the URDF, by default 0.5."""
+    pads counts. If not given, 0.5 is assumed, and a simulation uses the value in the URDF."""
     grip_height: Distance = 0.0
     """Height above the underside at which fingers hold the object [m]; 0: the middle."""
     grip_widths: tuple[Length, Length] | None = None

@@ -255,7 +255,7 @@ def check_loads(
             yield make_error(span, "too-heavy", message, hint)
         elif pull > force / safety_factor:
             limit = f"{force:g} N / safety factor {safety_factor:g} = {force / safety_factor:.3g} N"
-            message = f"{problem} pulls with {pull:.1f} N in the slowest lift, more than {limit}"
+            message = f"{problem} pulls with {pull:.3g} N in the slowest lift, more than {limit}"
             yield make_warning(span, "too-heavy", message, hint)
 
 

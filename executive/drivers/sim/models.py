@@ -135,6 +135,8 @@ def add_body(client: BulletClient, config: ObjectConfig, X_WO: Pose) -> int:
         if config.mass is not None:
             client.changeDynamics(body, -1, mass=config.mass)
     client.changeDynamics(body, -1, rollingFriction=ROLLING_FRICTION, spinningFriction=ROLLING_FRICTION)
+    if "friction" in config.model_fields_set:
+        client.changeDynamics(body, -1, lateralFriction=config.friction)
     return int(body)
 
 
@@ -185,6 +187,13 @@ def _find_wrong_sizes(label: str, config: ObjectConfig) -> Iterator[tuple[KeyPat
         if not abs(declared_size - model_size) <= SIZE_TOLERANCE:  # also True for NaN
             message = f"the model of {label} has a {name} of {model_size:.4f} m, not {declared_size:g} m; "
             yield ("objects", label, name), message + f"correct {name}, scale or upright_deg"
+    sides = sorted(cv2.minAreaRect(mesh.vertices[:, :2].astype(np.float32))[1])
+    if config.footprint and not np.abs(np.subtract(sorted(config.footprint), sides)).max() <= SIZE_TOLERANCE:
+        message = f"the model of {label} has a footprint of {sides[1]:.4f} by {sides[0]:.4f} m, not "
+        yield (
+            ("objects", label, "footprint"),
+            f"{message}{config.footprint[0]:g} by {config.footprint[1]:g} m",
+        )
 
 
 @lru_cache(maxsize=64)

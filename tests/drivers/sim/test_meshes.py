@@ -85,12 +85,28 @@ def test_what_is_no_mesh_is_refused_with_the_reason(text: str, complaint: str, t
         read_mesh(path)
 
 
+def test_the_declared_friction_is_that_of_the_body(
+    build: Build, overhead: CellConfig, wedge: ObjectConfig
+) -> None:
+    wet = ObjectConfig.model_validate({**wedge.model_dump(exclude_unset=True), "friction": 0.2})
+    world = build(with_objects(overhead, wet=wet))
+    body = world.add_object("wet", Pose.of([0.5, 0.0, 0.1]), (1, 1, 1))
+    assert world.client.getDynamicsInfo(body, -1)[1] == 0.2
+
+
 def test_missing_models_and_wrong_sizes_are_named_with_their_keys(
     overhead: CellConfig, wedge: ObjectConfig
 ) -> None:
     gone = wedge.model_copy(update={"mesh": "gone.obj"})
     half = overhead.objects["cube"].model_copy(update={"scale": 0.5})
-    found = dict(find_model_errors(with_objects(overhead, gone=gone, half=half)))
-    keys = ("gone", "mesh"), ("half", "height"), ("half", "radius")
+    flat = overhead.objects["cube"].model_copy(update={"footprint": (0.05, 0.02)})
+    found = dict(find_model_errors(with_objects(overhead, gone=gone, half=half, flat=flat)))
+    keys = (
+        ("gone", "mesh"),
+        ("half", "height"),
+        ("half", "radius"),
+        ("half", "footprint"),
+        ("flat", "footprint"),
+    )
     assert list(found) == [("objects", *key) for key in keys]
     assert "height of 0.0250 m, not 0.05 m; correct height" in found["objects", "half", "height"]
