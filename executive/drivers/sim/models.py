@@ -187,12 +187,18 @@ def _find_wrong_sizes(label: str, config: ObjectConfig) -> Iterator[tuple[KeyPat
         if not abs(declared_size - model_size) <= SIZE_TOLERANCE:  # also True for NaN
             message = f"the model of {label} has a {name} of {model_size:.4f} m, not {declared_size:g} m; "
             yield ("objects", label, name), message + f"correct {name}, scale or upright_deg"
-    sides = sorted(cv2.minAreaRect(mesh.vertices[:, :2].astype(np.float32))[1])
-    if config.footprint and not np.abs(np.subtract(sorted(config.footprint), sides)).max() <= SIZE_TOLERANCE:
-        message = f"the model of {label} has a footprint of {sides[1]:.4f} by {sides[0]:.4f} m, not "
+    if config.footprint is None:
+        return
+    corners = cv2.convexHull(mesh.vertices[:, :2].astype(np.float32))[:, 0] @ [1, 1j]
+    turned = corners * np.exp(1j * np.radians(np.arange(90)))[:, None]
+    sides = np.sort(np.stack([np.ptp(turned.real, axis=1), np.ptp(turned.imag, axis=1)], axis=1), axis=1)
+    errors = np.abs(sides - np.sort(config.footprint)).max(axis=1)
+    if not errors.min() <= SIZE_TOLERANCE:
+        width, length = sides[errors.argmin()].tolist()
+        message = f"the model of {label} has a footprint of {length:.4f} by {width:.4f} m, not "
         yield (
             ("objects", label, "footprint"),
-            f"{message}{config.footprint[0]:g} by {config.footprint[1]:g} m",
+            message + " by ".join(f"{side:g}" for side in config.footprint) + " m",
         )
 
 
