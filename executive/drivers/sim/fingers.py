@@ -37,11 +37,13 @@ MIN_EFFORT_FRACTION = 0.5
 """Minimum effort of the motor at a grip, as a fraction of the declared effort."""
 MIN_TOUCH_FORCE = 2.0
 """Minimum force of a detected contact [N], as of the sensors in the joints of the arm."""
-STALLED_STEP_COUNT = 4
-"""Number of physics steps without motion after which the motor tries to move with `PRESSING_SPEED`."""
+STALLED_STEP_COUNT = 10
+"""Number of physics steps without motion after which a weak motor tries to move with `PRESSING_SPEED`."""
+MAX_WEAK_FRACTION = 0.9
+"""Maximum effort of a weak motor, as a fraction of the declared effort."""
 PRESSING_SPEED = 0.5
-"""Speed of a finger that presses [m/s]. The solver reaches the force of a motor that an object stops only if
-the motor is much faster: with 0.02 m/s, it reached 6 N of 20 N."""
+"""Speed of a finger with a weak motor that an object has stopped [m/s]. The solver reaches the effort of a
+stopped motor only if the motor is fast enough: with 0.02 m/s, it reached 6 N of 20 N."""
 LOAD_SMOOTHING = 0.1
 """Weight of the newest step in the low-pass filter of the load; the time constant is 40 ms."""
 
@@ -199,13 +201,11 @@ class SimFingers:
         min_opening = self._closed_opening + MIN_WIDTH
         _, velocity, _, effort = self._world.client.getJointState(self._world.arm, self._joints[0])
         effort = abs(effort)
-        # The fingers tremble while they push, but do not close further unless they lose the object.
-        is_pushing = self._stalled_step_count >= STALLED_STEP_COUNT
-        is_moving = (
-            opening < self._grip_opening - MAX_CLOSING if is_pushing else abs(velocity) > self._min_speed
-        )
-        self._stalled_step_count = 0 if is_moving else self._stalled_step_count + 1
-        self._command(self._closed_opening, PRESSING_SPEED if is_pushing else self._model.speed)
+        self._stalled_step_count = self._stalled_step_count + 1 if abs(velocity) < self._min_speed else 0
+        if self._stalled_step_count == STALLED_STEP_COUNT and effort < MAX_WEAK_FRACTION * self._model.effort:
+            self._command(self._closed_opening, PRESSING_SPEED)
+        elif opening < self._grip_opening - MAX_CLOSING:
+            self._command(self._closed_opening, self._model.speed)
         is_pressing = opening > min_opening and effort >= MIN_EFFORT_FRACTION * self._model.effort
         if is_pressing:
             self._grip_opening = opening
