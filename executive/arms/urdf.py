@@ -191,37 +191,6 @@ class JointChain:
         return float(sum(np.linalg.norm(X.position) for X in (*self.offsets[2:], self.X_nF)))
 
 
-@lru_cache(maxsize=16)
-def read_couplings(urdf: str, joint: str) -> Mapping[str, float]:
-    """Return the ratio of the position of each coupled joint of a tool to that of `joint`, which is first.
-
-    The names are those of the model attached to an arm, with the prefix `ATTACHED_PREFIX`.
-
-    Raises:
-        InputError: The model has no such joint, or a coupled joint has no limits.
-    """
-    path = find_model(urdf)
-    joints = read_robot(path).findall("joint")
-    names = [element.get("name", "") for element in joints]
-    if joint not in names:
-        raise InputError(
-            f'the model {path.name} has no joint "{joint}"; {suggest_choice(joint, names, "Joints")}'
-        )
-    factors = {joint: 1.0}
-    for element in joints:
-        mimic = element.find("mimic")
-        if mimic is not None and mimic.get("joint") == joint:
-            (factors[element.get("name", "")],) = parse_numbers(path, mimic, "multiplier", (1.0,))
-    for element in joints:
-        name = element.get("name", "")
-        has_limits = element.get("type") in ("revolute", "prismatic") and element.find("limit") is not None
-        if name in factors and not has_limits:
-            raise InputError(
-                f'the joint "{name}" of {path.name} must be revolute or prismatic, with a <limit>'
-            )
-    return {ATTACHED_PREFIX + name: factor for name, factor in factors.items()}
-
-
 def locate_flange(flange: FlangeConfig) -> Pose:
     """Return the pose of the flange in the frame of its link."""
     rotation = make_rotation(*np.radians(flange.rotation_deg))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING, ClassVar, Literal, Self
@@ -12,13 +13,14 @@ from typing import TYPE_CHECKING, ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from executive.arms.urdf import read_couplings
+from executive.arms.urdf import ATTACHED_PREFIX, find_model, parse_numbers, read_robot
 from executive.cell.arm import Goal
 from executive.cell.device_config import Angles, Distance, Force, Length, MotionConfig, Section
 from executive.cell.objects import ObjectClass, Target
 from executive.cell.tools import GraspAttempt, GraspPose, ToolMeasurement, ToolModel, ToolPart
-from executive.errors import Blocked
+from executive.errors import Blocked, InputError
 from executive.geometry import Yaw
+from executive.text.findings import suggest_choice
 
 if TYPE_CHECKING:
     from executive.drivers.sim.fingers import SimFingers
@@ -371,3 +373,34 @@ class Fingers(ToolModel):
         from executive.drivers.sim.fingers import SimFingers
 
         return SimFingers(world, self, noise_seed)
+
+
+@lru_cache(maxsize=16)
+def read_couplings(urdf: str, joint: str) -> Mapping[str, float]:
+    """Return the ratio of the position of each coupled joint of a tool to that of `joint`, which is first.
+
+    The names are those of the model attached to an arm, with the prefix `ATTACHED_PREFIX`.
+
+    Raises:
+        InputError: The model has no such joint, or a coupled joint has no limits.
+    """
+    path = find_model(urdf)
+    joints = read_robot(path).findall("joint")
+    names = [element.get("name", "") for element in joints]
+    if joint not in names:
+        raise InputError(
+            f'the model {path.name} has no joint "{joint}"; {suggest_choice(joint, names, "Joints")}'
+        )
+    factors = {joint: 1.0}
+    for element in joints:
+        mimic = element.find("mimic")
+        if mimic is not None and mimic.get("joint") == joint:
+            (factors[element.get("name", "")],) = parse_numbers(path, mimic, "multiplier", (1.0,))
+    for element in joints:
+        name = element.get("name", "")
+        has_limits = element.get("type") in ("revolute", "prismatic") and element.find("limit") is not None
+        if name in factors and not has_limits:
+            raise InputError(
+                f'the joint "{name}" of {path.name} must be revolute or prismatic, with a <limit>'
+            )
+    return {ATTACHED_PREFIX + name: factor for name, factor in factors.items()}
