@@ -147,15 +147,15 @@ def _find_wrong_openings(config: CellConfig, world: CellWorld) -> Iterator[tuple
 
     Two rays measure the distance, from the tool centre point along the y axis of the tool in both directions.
     """
+    max_opening = config.tool.max_opening
     X_WT = world.get_tool_pose()
     start = X_WT.position.tolist()
     ends = X_WT.apply(np.array([[0.0, -MAX_FINGER_DISTANCE, 0.0], [0.0, MAX_FINGER_DISTANCE, 0.0]])).tolist()
-    max_opening = config.tool.max_opening
-    for opening in (max_opening, 0.75 * max_opening, 0.5 * max_opening):
+    for opening in (max_opening, 0.75 * max_opening, 0.5 * max_opening) if max_opening else ():
         world.set_opening(opening)
         hits = world.client.rayTestBatch([start, start], ends)
         distances = [hit[2] * MAX_FINGER_DISTANCE for hit in hits]
-        if max_opening and max(abs(each - opening / 2) for each in distances) > MAX_FINGER_ERROR:
+        if max(abs(each - opening / 2) for each in distances) > MAX_FINGER_ERROR:
             places = " and ".join(
                 f"{each * 1000:.0f} mm" if each < MAX_FINGER_DISTANCE else "nothing" for each in distances
             )
