@@ -9,6 +9,8 @@ from executive.manipulation.grasps import measure_held_yaw
 from executive.manipulation.motions import wait_for_fingers
 from executive.skill import EMPTY, HOLDING, In, Out, Seconds, Skill, param, port
 
+PRESSING_TIME = 0.1
+"""Time in which fingers at rest that hold no object yet may still begin to press [s]."""
 MAX_FALSE_GRASPS = 3
 """Number of contradicted grasps in a row after which the sensor of the tool is no longer believed."""
 
@@ -44,6 +46,9 @@ class Grasp(Skill):
         try:
             yield from cell.clock.sleep(self.settle)
             yield from wait_for_fingers(cell)
+            if cell.tool_model.max_opening and not cell.tool.holding:
+                # Slow fingers press only some time after an object has stopped them.
+                yield from cell.clock.sleep(PRESSING_TIME)
             is_gripping = cell.tool.holding
             if cell.tool_model.max_opening:
                 measurement = cell.tool_model.measure_grip(cell.classes[self.target.label], cell.tool.opening)
