@@ -44,6 +44,8 @@ from executive.cell.frame import ErrorRates
 from executive.cell.objects import Bin, ObjectClass
 from executive.cell.tools import ToolModel
 
+DEFAULT_FRICTION = 0.5
+"""Coefficient of friction of a class that declares none; the default of PyBullet."""
 MAX_SQUARE_RATIO = 1.02
 """Maximum ratio of the sides of a footprint that counts as square."""
 MAX_ROUND_RATIO = (1 + 2**0.5) / 2
@@ -95,7 +97,7 @@ class ObjectConfig(Section):
     not given, 45 with 4, 90 with 1 or 2 and a footprint of a larger width than length, otherwise 0."""
     ring: Distance = 0.0
     """Distance of the contact point from the centre [m]; above 0 only for parts with a hole."""
-    friction: float = Field(0.5, ge=0.01, le=5)
+    friction: float | None = Field(None, ge=0.01, le=5)
     """Coefficient of friction of the surface, for tools that hold by friction; its product with that of the
     pads counts. If not given, 0.5 is assumed, and a simulation uses the value in the URDF."""
     grip_height: Distance = 0.0
@@ -110,7 +112,7 @@ class ObjectConfig(Section):
         """Return the declared object class; if the section declares no mass, with the default mass."""
         object_class = ObjectClass(
             label, self.height, self.radius, self.ring, looks_like=self.looks_like,
-            footprint=self.footprint, flat_top=self.flat_top, friction=self.friction,
+            footprint=self.footprint, flat_top=self.flat_top, friction=self.friction or DEFAULT_FRICTION,
             grip_height=self.grip_height, grip_widths=self.grip_widths, **self._derive_yaw_properties(),
         )  # fmt: skip
         if self.mass is None:

@@ -135,7 +135,7 @@ def add_body(client: BulletClient, config: ObjectConfig, X_WO: Pose) -> int:
         if config.mass is not None:
             client.changeDynamics(body, -1, mass=config.mass)
     client.changeDynamics(body, -1, rollingFriction=ROLLING_FRICTION, spinningFriction=ROLLING_FRICTION)
-    if "friction" in config.model_fields_set:
+    if config.friction is not None:
         client.changeDynamics(body, -1, lateralFriction=config.friction)
     return int(body)
 
