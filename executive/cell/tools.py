@@ -202,6 +202,11 @@ class ToolModel(Section):
         """Largest distance between the fingers [m]; 0 for a tool without fingers."""
         return 0.0
 
+    @property
+    def min_opening(self) -> float:
+        """Distance between the closed fingers [m]."""
+        return 0.0
+
     def list_parts(self, opening: float) -> Sequence[ToolPart]:  # noqa: ARG002
         """Return `parts`, and the fingers at an opening [m], the lowest last and the palm first."""
         return self.parts

@@ -93,6 +93,8 @@ POINTS_PER_SIDE = 9
 """Number of positions of the flattest object along each side of the workspace for the check of occlusion."""
 DIFFERENTIATION_STEP = 1e-5
 """Step of a joint for the numerical derivative of the height of the tool [rad]."""
+OPENING_COUNT = 8
+"""Number of openings at which the model of a tool is compared with its section."""
 MAX_FINGER_DISTANCE = 0.5
 """Maximum distance of a finger from the tool centre point [m]."""
 MAX_FINGER_ERROR = 0.003
@@ -148,10 +150,12 @@ def _find_wrong_openings(config: CellConfig, world: CellWorld) -> Iterator[tuple
     Two rays measure the distance, from the tool centre point along the y axis of the tool in both directions.
     """
     max_opening = config.tool.max_opening
+    if not max_opening:
+        return
     X_WT = world.get_tool_pose()
     start = X_WT.position.tolist()
     ends = X_WT.apply(np.array([[0.0, -MAX_FINGER_DISTANCE, 0.0], [0.0, MAX_FINGER_DISTANCE, 0.0]])).tolist()
-    for opening in (max_opening, 0.75 * max_opening, 0.5 * max_opening) if max_opening else ():
+    for opening in np.linspace(max_opening, config.tool.min_opening, OPENING_COUNT + 1)[:-1].tolist():
         world.set_opening(opening)
         hits = world.client.rayTestBatch([start, start], ends)
         distances = [hit[2] * MAX_FINGER_DISTANCE for hit in hits]

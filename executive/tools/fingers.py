@@ -142,6 +142,11 @@ class Fingers(ToolModel):
         return self.stroke
 
     @property
+    def min_opening(self) -> float:
+        """Distance between the closed fingers [m]."""
+        return self.closed
+
+    @property
     def palm_offset(self) -> float:
         """Distance from the tool centre point back to the palm [m]."""
         return self.finger[2] - self.tip
@@ -382,7 +387,7 @@ def read_couplings(urdf: str, joint: str) -> Mapping[str, float]:
     The names are those of the model attached to an arm, with the prefix `ATTACHED_PREFIX`.
 
     Raises:
-        InputError: The model has no such joint, or a coupled joint has no limits.
+        InputError: The model has no such joint, or a coupled joint has no limits, or an offset.
     """
     path = find_model(urdf)
     joints = read_robot(path).findall("joint")
@@ -399,8 +404,8 @@ def read_couplings(urdf: str, joint: str) -> Mapping[str, float]:
     for element in joints:
         name = element.get("name", "")
         has_limits = element.get("type") in ("revolute", "prismatic") and element.find("limit") is not None
-        if name in factors and not has_limits:
-            raise InputError(
-                f'the joint "{name}" of {path.name} must be revolute or prismatic, with a <limit>'
-            )
+        has_offset = any(parse_numbers(path, each, "offset", (0.0,))[0] for each in element.iter("mimic"))
+        if name in factors and (has_offset or not has_limits):
+            needed = "revolute or prismatic, with a <limit>, and its <mimic> without an offset"
+            raise InputError(f'the joint "{name}" of {path.name} must be {needed}')
     return {ATTACHED_PREFIX + name: factor for name, factor in factors.items()}

@@ -26,6 +26,7 @@ from executive.motion.joints import build_kinematics
 from executive.physics.cell_world import NORMAL_FORCE
 from executive.testing.fake_cell import FakeCell
 from executive.testing.faults import during, grip_fails, grip_lost
+from executive.testing.oracle import make_oracle_kind
 from executive.testing.run_mission import run_mission
 from executive.testing.run_skill import run_skill
 from executive.tools.fingers import Fingers
@@ -261,6 +262,7 @@ GRIPPER = (
         ("0 1 0", "1 0 0", "the model has 55 mm and nothing beside"),
         ("0 0.006 0.165", "0 0.026 0.165", "the model has 55 mm and 75 mm beside"),
         ("motor", "engine", 'no joint "motor"'),
+        ("<mimic joint='motor'", "<mimic joint='motor' offset='0.01'", "its <mimic> without an offset"),
     ],
 )
 def test_check_compares_the_model_of_a_gripper_with_its_section(
@@ -278,6 +280,32 @@ def test_check_compares_the_model_of_a_gripper_with_its_section(
     assert text in result.output.replace("\n", " ")
     assert result.exit_code == (2 if text else 0)
     assert ("cell.yaml:" in result.output) is bool(text)
+
+
+def test_check_compares_every_part_of_the_openings(missions: Path, tmp_path: Path) -> None:
+    (tmp_path / "gripper.urdf").write_text(GRIPPER)
+    tool = yaml.safe_load((missions / "cells" / "iiwa_wsg50.yaml").read_text())["tool"]
+    openings = [[0.0, 0.0], [0.0125, 0.05], [0.0276, 0.0552], [0.055, 0.11]]
+    model = {"urdf": "gripper.urdf", "joint": "motor", "openings": openings, "effort": 20.0}
+    cell = tmp_path / "cell.yaml"
+    cell.write_text(
+        yaml.safe_dump({"tool": {**tool, "model": model}, "base": "iiwa_wsg50.yaml", "cell": "own"})
+    )
+    assert "mm beside the tool centre point" in invoke("check", "sort_overhead", "--cell", str(cell)).output
+    narrow = {**tool, "closed": 0.066}
+    cell.write_text(yaml.safe_dump({"tool": narrow, "base": "iiwa_wsg50.yaml", "cell": "own"}))
+    assert "beside the tool centre point" not in invoke("check", "sort_overhead", "--cell", str(cell)).output
+
+
+def test_slow_fingers_get_the_time_to_press(missions: Path) -> None:
+    result = run_mission(
+        missions / "sort_overhead.yaml",
+        make_oracle_kind(),
+        cell="iiwa_wsg50",
+        seed=4,
+        set={"cell.tool.speed": "0.02"},
+    )
+    assert (result.status, result.agrees) == ("SUCCESS", True)
 
 
 def test_closed_fingers_do_not_prove_that_nothing_is_there(fake_fingers: FakeCell) -> None:
