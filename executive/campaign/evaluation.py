@@ -167,7 +167,8 @@ def measure_detector(
     name = detector.name
     if settings.dataset is not None:
         known_classes = classes or find_detectable_labels(detector.configs, detector.base_folder)[name] or ()
-        settings.dataset.match_classes(known_classes, f"detector {name}")
+        class_map = (detector.configs[name].model_extra or {}).get("class_map", {})
+        settings.dataset.match_classes(known_classes, f"detector {name}", class_map)
     images: Images | None = settings.dataset
     if images is None:
         assert detector.cell is not None

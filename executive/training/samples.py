@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 import os
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any
 
 import numpy as np
@@ -172,17 +173,21 @@ class LabelledDataset:
         notes = "".join(f"; {count} {description}" for description, count in self.notes.items() if count)
         return f"{self._name}: {len(self)} images; objects: {counts or 'none'}{notes}"
 
-    def match_classes(self, known: Collection[str], source: str) -> None:
-        """Spell class names as in `known` if they differ only in case or outer spaces.
+    def match_classes(
+        self, known: Collection[str], source: str, class_map: Mapping[str, str] = MappingProxyType({})
+    ) -> None:
+        """Spell class names as in `known` if they differ only in case or outer spaces, or translate them.
 
         Args:
             known: Known class names; empty: the names are unknown.
             source: Description of the source of the known names.
+            class_map: Known class names by other names; several names may stand for one class.
 
         Raises:
             InputError: There are known class names, but no object has one of them.
         """
         spellings = {name.casefold(): name for name in known} | {name: name for name in known}
+        spellings |= {name.casefold(): label for name, label in class_map.items()}
         for path, entry in self.annotations.items():
             pairs = ((label, label.strip().casefold()) for label in entry.labels)
             labels = tuple(spellings.get(name, spellings.get(key, name)) for name, key in pairs)
@@ -190,7 +195,8 @@ class LabelledDataset:
         if known and not self.object_counts.keys() & set(known):
             names = ", ".join(self.object_counts)
             problem = f"no class of the objects ({names}) is a class of {source} ({', '.join(known)})"
-            raise InputError(f"{self._name}: {problem}; rename the classes of the dataset")
+            advice = "rename the classes of the dataset, or translate them with the class_map of the detector"
+            raise InputError(f"{self._name}: {problem}; {advice}")
 
     def _read_coco(self) -> list[str]:
         """Read the annotations in a COCO file, and return the classes."""

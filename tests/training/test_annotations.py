@@ -58,6 +58,14 @@ def test_a_dataset_of_another_tool_is_read_like_the_clean_one(tmp_path, samples,
     assert len(images.classes) == 3
 
 
+def test_several_names_of_a_dataset_may_stand_for_one_class(tmp_path, samples):
+    VARIANTS[next(iter(VARIANTS))](tmp_path / "data", samples)
+    images = LabelledDataset(tmp_path / "data")
+    count = images.object_counts.total()
+    images.match_classes(["shape"], "detector eye", {"Cube": "shape", "duck": "shape", "sphere": "shape"})
+    assert images.object_counts == {"shape": count}
+
+
 @pytest.mark.parametrize("word", REFUSED)
 def test_an_ambiguous_or_damaged_dataset_is_refused(tmp_path, samples, word):
     write, options = REFUSED[word]
