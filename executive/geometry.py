@@ -39,6 +39,18 @@ class Yaw(NamedTuple):
         return math.remainder(other.angle - self.angle, period)
 
 
+class HeldPose(NamedTuple):
+    """Place of a held object relative to the tool.
+
+    Attributes:
+        yaw: Yaw relative to the tool.
+        offset: Position of the middle of the object, along the x and y axes of the tool [m].
+    """
+
+    yaw: Yaw
+    offset: tuple[float, float] = (0.0, 0.0)
+
+
 @dataclass(frozen=True, eq=False)
 class Pose:
     """Rigid transform: a rotation followed by a translation.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from executive.cell.objects import Item, Target
 from executive.cell.protocols import Cell, Steps
 from executive.cell.tools import ToolMeasurement
-from executive.manipulation.grasps import measure_held_yaw
+from executive.manipulation.grasps import measure_held_pose
 from executive.manipulation.motions import wait_for_fingers
 from executive.skill import EMPTY, HOLDING, In, Out, Seconds, Skill, param, port
 
@@ -68,5 +68,5 @@ class Grasp(Skill):
                 message = f"{message}, and no pick has succeeded; check the tool and its sensor"
                 raise self.failure("sensor_implausible", message)
             raise self.failure("missed", message)
-        cell.ledger.record_grasp(self.target.item, measure_held_yaw(cell, self.target))
+        cell.ledger.record_grasp(self.target.item, measure_held_pose(cell, self.target))
         self.held = self.target.item

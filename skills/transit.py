@@ -43,8 +43,8 @@ class Transit(Skill):
         if doubt := explain_uncertain_bin(cell, self.bin, self.held):
             raise self.failure("blocked", doubt)
         try:
-            held_yaw = cell.ledger.get_held_yaw(self.held)
-            goal = make_bin_goal(cell, self.bin, self.held, held_yaw, self.drop)
+            held_pose = cell.ledger.get_held_pose(self.held)
+            goal = make_bin_goal(cell, self.bin, self.held, held_pose, self.drop)
         except Blocked as error:
             raise self.failure("blocked", str(error)) from error
         yield from transport(self, cell, self.held, goal, self.bin)

@@ -41,7 +41,7 @@ from executive.cell.device_config import (
     check_ascending,
 )
 from executive.cell.frame import ErrorRates
-from executive.cell.objects import Bin, ObjectClass
+from executive.cell.objects import Bin, GraspPoint, ObjectClass
 from executive.cell.tools import ToolModel
 
 DEFAULT_FRICTION = 0.5
@@ -50,6 +50,19 @@ MAX_SQUARE_RATIO = 1.02
 """Maximum ratio of the sides of a footprint that counts as square."""
 MAX_ROUND_RATIO = (1 + 2**0.5) / 2
 """Maximum ratio of the diameter of an object to the side of its square footprint if it counts as round."""
+
+
+class GraspConfig(Section):
+    """A point at which tools hold objects of a class."""
+
+    point: Vector
+    """x and y from the middle of the object, and z above its underside [m]; the axes are those of the model
+    after `upright_deg`."""
+    width: Length | None = None
+    """Distance between fingers that hold the object there [m]; if not given, that of a side of the
+    footprint."""
+    direction_deg: Angle = 90.0
+    """Angle from the x axis to the line on which fingers close [degree]."""
 
 
 class ObjectConfig(Section):
@@ -62,6 +75,9 @@ class ObjectConfig(Section):
     """Path of a mesh (`.obj`, `.stl` or `.dae`), relative to the cell file or to pybullet_data. The collision
     shape is the convex hull of the mesh, but of each group (`o`) of an `.obj` mesh: a part with a hole needs
     several groups."""
+    variants: tuple[str, ...] = ()
+    """Paths of further meshes, of about the same size, for classes whose objects differ: each object in
+    simulation has one of the meshes, with equal probability."""
     mass: float | None = Field(None, ge=1e-4, le=1000)
     """Mean mass of the objects [kg]. If not given, a weight is no evidence about the class, and a simulation
     uses the mass in the URDF, or 0.05 kg for a mesh."""
@@ -105,14 +121,40 @@ class ObjectConfig(Section):
     grip_widths: tuple[Length, Length] | None = None
     """Smallest and largest distance between fingers that hold the object [m]; by default that of the sides of
     `footprint`, or the diameter of a round object."""
+    grasp: GraspConfig | tuple[GraspConfig, ...] = ()
+    """Points at which tools hold the object, the best first; by default the middle. Points beside the middle
+    need images that show the yaw of the object."""
     colours: tuple[Colour, ...] = ((1.0, 1.0, 1.0),)
     """Colours (red, green, blue, each 0 to 1) from which the colour of each spawned object is drawn."""
 
+    def list_models(self) -> list[ObjectConfig]:
+        """Return this section, and copies with each of the variants as the mesh."""
+        return [self, *(self.model_copy(update={"mesh": mesh}) for mesh in self.variants)]
+
+    @property
+    def grasps(self) -> tuple[GraspConfig, ...]:
+        """Sections of the grasp points."""
+        return self.grasp if isinstance(self.grasp, tuple) else (self.grasp,)
+
+    @property
+    def needs_yaw(self) -> bool:
+        """True if a grasp point is beside the middle, so that its place depends on the yaw."""
+        return any(point.point[:2] != (0.0, 0.0) for point in self.grasps)
+
+    def draw_model(self, rng: np.random.Generator) -> ObjectConfig:
+        """Return this section, or a copy with a variant as the mesh; all have the same probability."""
+        return self.list_models()[int(rng.integers(1 + len(self.variants)))] if self.variants else self
+
     def build_class(self, label: str) -> ObjectClass:
         """Return the declared object class; if the section declares no mass, with the default mass."""
+        points = tuple(
+            GraspPoint(grasp.point, grasp.width, math.radians(grasp.direction_deg)) for grasp in self.grasps
+        )
+        distances = [math.hypot(*point.position[:2]) for point in points]
         object_class = ObjectClass(
-            label, self.height, self.radius, self.ring, looks_like=self.looks_like,
+            label, self.height, self.radius, max([self.ring, *distances]), looks_like=self.looks_like,
             footprint=self.footprint, flat_top=self.flat_top, friction=self.friction or DEFAULT_FRICTION,
+            grasp_points=points,
             grip_height=self.grip_height, grip_widths=self.grip_widths, **self._derive_yaw_properties(),
         )  # fmt: skip
         if self.mass is None:
@@ -140,12 +182,28 @@ class ObjectConfig(Section):
     def _check_model(self) -> ObjectConfig:
         if bool(self.urdf) == bool(self.mesh):
             raise ValueError("needs either a urdf or a mesh" + (", not both" if self.urdf else ""))
+        if self.variants and not self.mesh:
+            raise ValueError("has variants, so it needs a mesh")
         if self.ring >= self.radius:
             raise ValueError(
                 f"has a ring of {self.ring:g} m, which must be smaller than the radius, {self.radius:g} m"
             )
         if self.footprint and max(self.footprint) > 2 * self.radius:
             raise ValueError(f"has a footprint longer than its diameter, 2 x {self.radius:g} m")
+        for point in self.grasps:
+            x, y, z = point.point
+            if math.hypot(x, y) > self.radius or not 0 < z <= self.height:
+                raise ValueError(
+                    f"has a grasp point at {x:g}, {y:g}, {z:g} m, outside of the object: at most "
+                    f"{self.radius:g} m from the middle, and up to {self.height:g} m above the underside"
+                )
+        if self.ring and self.grasp:
+            raise ValueError("has a ring or grasp points, not both")
+        if self.needs_yaw and not (self.footprint and self._derive_yaw_properties()["yaw_symmetry"]):
+            raise ValueError(
+                "needs a footprint for a grasp point beside the middle, and no yaw_symmetry of 0, so that "
+                "images show its yaw"
+            )
         if self.yaw_symmetry and not self.footprint:
             raise ValueError("needs a footprint for its yaw_symmetry; an outline must fit it")
         return self
@@ -273,6 +331,9 @@ class UndeclaredConfig(Section):
     ignore: tuple[Name, ...] = ()
     """Labels whose objects may lie on the table: the run ignores their boxes. Any other object of no class
     is rejected, so that the run ends as INCOMPLETE."""
+    meshes: tuple[str, ...] = ()
+    """Paths or patterns (`others/*.obj`) of meshes of objects of no class, relative to the cell file. Some
+    images of a dataset show them, so that a detector learns that they are none of its objects."""
 
 
 class CellConfig(Section):
@@ -325,7 +386,8 @@ class CellConfig(Section):
     @property
     def needs_yaw(self) -> bool:
         """True if images must show the yaws of objects, for the grasps of the tool or for a bin."""
-        return self.tool.needs_yaw or any(bin.place_yaw_deg is not None for bin in self.bins.values())
+        needs = [bin.place_yaw_deg is not None for bin in self.bins.values()]
+        return self.tool.needs_yaw or any([*needs, *(model.needs_yaw for model in self.objects.values())])
 
     @property
     def max_object_height(self) -> float:

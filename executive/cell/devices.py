@@ -231,10 +231,11 @@ class DriverKind(Protocol):
 
     A kind may have a method `compute_mass(section)`, which returns the mass [kg] of the objects of a class,
     declared or not, or raises an `InputError`; `section` is an `executive.cell.config.ObjectConfig`. A kind
-    with the attribute `is_rehearsal`, which is True, has no physics: its frames contain true detections, its
-    arms hide nothing and move on straight joint paths, and nothing is measured. A kind may have an attribute
-    `driver_options`, which contains `file` or `flag` by the name of each option that it knows; the run
-    directory gets a copy of a file.
+    may have a method `measure_hold(config, label)`, which returns the largest force [N] with which the tool
+    can hold the model of a class. A kind with the attribute `is_rehearsal`, which is True, has no physics:
+    its frames contain true detections, its arms hide nothing and move on straight joint paths, and nothing
+    is measured. A kind may have an attribute `driver_options`, which contains `file` or `flag` by the name
+    of each option that it knows; the run directory gets a copy of a file.
     """
 
     def __call__(self, config: CellConfig, options: DriverOptions) -> Driver:

@@ -9,7 +9,7 @@ from typing import Protocol
 from executive.cell.frame import BinAppearance, Detections, Frame, Observation, Region
 from executive.cell.objects import Item, KnownItem, Target
 from executive.cell.tools import ToolMeasurement
-from executive.geometry import Array, Yaw
+from executive.geometry import Array, HeldPose
 
 
 class Presence(Enum):
@@ -199,13 +199,13 @@ class Ledger(Protocol):
         `found_table` is True if the descent to the item touched nothing above the table.
         """
 
-    def get_held_yaw(self, item: Item) -> Yaw | None:
-        """Return the yaw of an item relative to the tool at its last grasp; None if it is unknown."""
+    def get_held_pose(self, item: Item) -> HeldPose | None:
+        """Return the place of an item relative to the tool at its last grasp; None if its yaw is unknown."""
 
-    def record_grasp(self, item: Item, held_yaw: Yaw | None = None) -> None:
+    def record_grasp(self, item: Item, held_pose: HeldPose | None = None) -> None:
         """Record that the tool holds an item; the grasp may have moved neighbouring objects.
 
-        `held_yaw` is the yaw of the item relative to the tool; None if it is unknown.
+        `held_pose` is the place of the item relative to the tool; None if its yaw is unknown.
 
         Raises:
             Fault: According to the ledger, the tool still holds another item.

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, ClassVar, TypeAlias
+from typing import Annotated, ClassVar, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -105,6 +105,21 @@ class KnownItem:
         return self.state in ("open", "deferred")
 
 
+class GraspPoint(NamedTuple):
+    """A point of an object at which a tool holds it.
+
+    Attributes:
+        position: x and y from the middle of the object, and z above its underside [m]; the axes are those of
+            the model after `upright_deg`.
+        width: Distance between fingers that hold the object there [m].
+        direction: Angle of the line on which the fingers close [rad], from the x axis of the object.
+    """
+
+    position: tuple[float, float, float]
+    width: float | None = None
+    direction: float = math.pi / 2
+
+
 @dataclass(frozen=True)
 class ObjectClass:
     """Known properties of a class of objects.
@@ -113,7 +128,8 @@ class ObjectClass:
         label: Class name that the detectors use.
         height: Height of the object as it lies on the table [m].
         radius: Radius of the circle around the outline of the object, seen from above [m].
-        contact_radius: Distance of the contact point from the centre [m]; above 0 only for parts with a hole.
+        contact_radius: Largest distance of a contact point from the centre [m]; above 0 only for parts with a
+            hole and for grasp points beside the centre.
         mass: Mass of the object [kg].
         mass_std: Standard deviation of the mass between the objects of the class [kg]; infinite if the cell
             file declares no mass.
@@ -129,6 +145,7 @@ class ObjectClass:
         grip_height: Height above the underside at which fingers hold the object [m]; 0: the middle.
         grip_widths: Smallest and largest distance between the fingers that hold the object [m]; None: that
             of the sides of `footprint`, or the diameter of a round object.
+        grasp_points: Points at which tools hold the object, the best first; (): the middle.
     """
 
     label: str
@@ -146,11 +163,23 @@ class ObjectClass:
     friction: float = 0.5
     grip_height: float = 0.0
     grip_widths: tuple[float, float] | None = None
+    grasp_points: tuple[GraspPoint, ...] = ()
 
     @property
     def top_heights(self) -> list[float]:
         """Possible heights above the table of the top of an object of the class [m], ascending."""
         return sorted({self.height + support_height for support_height in self.support_heights})
+
+    @property
+    def hold_height(self) -> float:
+        """Height above the underside at which a tool from above touches the object [m]."""
+        return max((point.position[2] for point in self.grasp_points), default=self.height)
+
+    @property
+    def touch_heights(self) -> list[float]:
+        """Possible heights above the table of a touch from above [m]: of the grasp points, or of the top."""
+        heights = [point.position[2] for point in self.grasp_points] or [self.height]
+        return [height + support for height in heights for support in self.support_heights]
 
     @property
     def outline_area(self) -> float:

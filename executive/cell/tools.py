@@ -15,9 +15,9 @@ from pydantic_core import CoreSchema
 
 from executive.cell.arm import Goal
 from executive.cell.device_config import Length, MotionConfig, Section
-from executive.cell.objects import ObjectClass, Target
-from executive.errors import InputError
-from executive.geometry import Array, Yaw
+from executive.cell.objects import GraspPoint, ObjectClass, Target
+from executive.errors import Blocked, InputError
+from executive.geometry import Array, Pose, Yaw, rotate_about_z
 from executive.plugins import list_entries
 
 TOOL_GROUP = "executive.tools"
@@ -230,15 +230,43 @@ class ToolModel(Section):
 
     def get_hold_height(self, object_class: ObjectClass) -> float:
         """Return the distance from the tool centre point down to the underside of a held object [m]."""
-        return object_class.height
+        return object_class.hold_height
 
     def compute_holding_force(self, object_class: ObjectClass, force: float) -> float:  # noqa: ARG002
         """Return the maximum force on an object of a class [N] if the sensor of the tool reports `force`."""
         return force
 
+    def measure_hold(self, client: Any, X_WT: Pose, body: int) -> float:  # noqa: ARG002
+        """Return the force with which the surface of a body of a pybullet client can be held [N]."""
+        return math.inf
+
     def compute_release_opening(self, object_class: ObjectClass) -> float:  # noqa: ARG002
         """Return the distance between the fingers after the release of an object [m]."""
         return 0.0
+
+    def list_points(self, object_class: ObjectClass, target: Target) -> list[tuple[GraspPoint, Array]]:
+        """Return the grasp points of an object, the best first, each with its place in the world `(3,)` [m].
+
+        If an image did not show which of its ends is which, each point is at two places.
+
+        Raises:
+            Blocked: The points depend on the yaw of the object, which no image showed.
+        """
+        X_WO = target.pose_at(target.stamp)
+        to_top = np.array([0.0, 0.0, object_class.height / 2])
+        if not object_class.grasp_points:
+            return [(GraspPoint((0.0, 0.0, object_class.height)), X_WO.position + to_top)]
+        if target.yaw is None and object_class.contact_radius:
+            raise Blocked(f"{target.item} can be held only at a known yaw, which no image showed")
+        turn_count = 1
+        if target.yaw and object_class.yaw_symmetry:
+            turn_count = target.yaw.symmetry // object_class.yaw_symmetry
+        turns = [rotate_about_z(math.tau * index / turn_count) for index in range(turn_count)]
+        return [
+            (point, X_WO.position - to_top + X_WO.rotation @ turn @ point.position)
+            for turn in turns
+            for point in object_class.grasp_points
+        ]
 
     def list_grasps(
         self, object_class: ObjectClass, target: Target, motion: MotionConfig, attempt: GraspAttempt

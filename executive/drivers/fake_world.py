@@ -132,8 +132,9 @@ class FakeWorld:
             gap = abs(underside + get_hold_height(object_class) - tip_position[2])
             if gap > TOUCH_DISTANCE or fake_object is self.held_object:
                 continue
-            distance = float(np.linalg.norm(fake_object.position[:2] - tip_position[:2]))
-            if abs(distance - object_class.contact_radius) <= MAX_GRIP_OFFSET:
+            offset = (fake_object.X_WO.rotation.T @ (tip_position - fake_object.position))[:2]
+            errors = [math.dist(point.position[:2], offset) for point in object_class.grasp_points]
+            if min(errors or [abs(math.hypot(*offset) - object_class.contact_radius)]) <= MAX_GRIP_OFFSET:
                 return fake_object
         return None
 

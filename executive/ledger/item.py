@@ -15,7 +15,7 @@ from executive.cell.json_values import round_values
 from executive.cell.objects import Item, Target
 from executive.errors import Fault
 from executive.events import Emit, ItemChanged
-from executive.geometry import Array, Yaw
+from executive.geometry import Array, HeldPose, Yaw
 from executive.ledger.belief import Belief
 
 SAME_POSITION_TOLERANCE = 0.01
@@ -86,7 +86,7 @@ class ItemRecord:
         confidence: Confidence of the last detection, 0 to 1.
         yaw: Mean of the angles measured since the last possible move of the item; None if it is unknown.
         yaw_weight: Sum of the inverse variances of these angles [1/rad²].
-        held_yaw: Yaw relative to the tool at the last grasp; None if it is unknown.
+        held_pose: Place relative to the tool at the last grasp; None if the yaw is unknown.
         state: State of the item.
         bin: Name of the bin that contains the item, or "".
         reason: Reason of the state, or "".
@@ -127,7 +127,7 @@ class ItemRecord:
     confidence: float = 0.0
     yaw: Yaw | None = None
     yaw_weight: float = 0.0
-    held_yaw: Yaw | None = None
+    held_pose: HeldPose | None = None
     state: State = State.SEEN
     bin: str = ""
     reason: str = ""

@@ -17,7 +17,7 @@ from executive.cell.protocols import Routes
 from executive.cell.tools import ToolMeasurement
 from executive.errors import Fault
 from executive.events import BinsEmptied, Emit, ItemChanged
-from executive.geometry import Array, Yaw
+from executive.geometry import Array, HeldPose
 from executive.ledger.bin_contents import BinContents
 from executive.ledger.certainty import Certainty
 from executive.ledger.coverage import Coverage
@@ -181,10 +181,10 @@ class Tracker:
         self.invalidate_positions()
         self._records.emit(record)
 
-    def get_held_yaw(self, item: Item) -> Yaw | None:
-        return self._records.find(item).held_yaw
+    def get_held_pose(self, item: Item) -> HeldPose | None:
+        return self._records.find(item).held_pose
 
-    def record_grasp(self, item: Item, held_yaw: Yaw | None = None) -> None:
+    def record_grasp(self, item: Item, held_pose: HeldPose | None = None) -> None:
         if (held_item := self.find_held_item()) not in (None, item):
             raise Fault(
                 f"the tool cannot hold {item}: it holds {held_item}; the skill that released {held_item} "
@@ -192,7 +192,7 @@ class Tracker:
             )
         record = self._records.find(item)
         self._has_grasped = True
-        record.held_yaw = held_yaw
+        record.held_pose = held_pose
         self._records.change_state(record, State.HELD)
         record.belief.is_confirmed = True
         record.was_taken_away = False

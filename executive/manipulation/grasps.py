@@ -20,7 +20,7 @@ from executive.cell.tools import (
     ToolPart,
 )
 from executive.errors import Blocked, Fault
-from executive.geometry import Array, Yaw, compute_tool_yaw, make_tool_down_pose
+from executive.geometry import Array, HeldPose, Yaw, compute_tool_yaw, make_tool_down_pose
 from executive.manipulation.tool_goals import (
     DROP_HEIGHT,
     find_layer_thickness,
@@ -34,6 +34,9 @@ YAW_COUNT = 24
 """Number of yaws that are tried if every yaw is permitted."""
 POINT_SPACING = 0.004
 """Maximum distance between the points that represent the base of a part of the tool [m]."""
+MAX_IGNORED_OFFSET = 0.001
+"""Maximum distance between the tool and the middle of an object that is not corrected [m], so that the
+planner may choose among the equal yaws of a symmetrical object."""
 SAFETY_DISTANCE = 0.001
 """Distance in addition to the margin of the cell file [m], so that the planner does not need the last
 millimetre."""
@@ -71,7 +74,12 @@ def choose_grasp(
         yaws, name = find_free_yaws(cell.tool_model, grasp.opening, grasp.goal, obstacles, bins, margin)
         blocker = blocker or name
         if not name:
-            task = Task(obstacles=obstacles, target=make_obstacle(cell, target), opening=grasp.opening)
+            obstacle = make_obstacle(cell, target)
+            if grasp.guard == "touch" and object_class.grasp_points:
+                # The tool may be lower than parts of the object that are higher than the grasp point.
+                depth = object_class.height - min(point.position[2] for point in object_class.grasp_points)
+                obstacle = replace(obstacle, top=obstacle.top - depth)
+            task = Task(obstacles=obstacles, target=obstacle, opening=grasp.opening)
             return replace(grasp, goal=replace(grasp.goal, yaws=yaws)), task
     raise Blocked(f"the open fingers have no space beside {target.item}: {blocker} is in the way")
 
@@ -86,23 +94,30 @@ def explain_blocked_grasp(cell: Cell, target: Target) -> str:
     return ""
 
 
-def measure_held_yaw(cell: Cell, target: Target) -> Yaw | None:
-    """Return the yaw of a target relative to the tool that grips it; None if it is unknown or not needed."""
+def measure_held_pose(cell: Cell, target: Target) -> HeldPose | None:
+    """Return the place of a target relative to the tool that grips it.
+
+    The result is None if no bin needs it, or if the yaw of the target is unknown.
+    """
     # The border records each read of the tool pose, so it is read only if a bin needs it.
     if target.yaw is None or not any(bin.place_yaws for bin in cell.bins.values()):
         return None
-    held_yaw = cell.tool_model.compute_held_yaw(target.yaw, compute_tool_yaw(cell.arm.tool_pose))
-    # The goal remains that of the plan ahead although the arm trembles.
-    return held_yaw._replace(angle=round(held_yaw.angle, 3))
+    X_WT = cell.arm.tool_pose
+    held_yaw = cell.tool_model.compute_held_yaw(target.yaw, compute_tool_yaw(X_WT))
+    x, y, _ = X_WT.inverse().apply(target.position).round(4).tolist()
+    # The fingers move the object between them to the middle. The goal remains that of the plan ahead although
+    # the arm trembles.
+    offset = (x, 0.0 if cell.tool_model.max_opening else y)
+    return HeldPose(held_yaw._replace(angle=round(held_yaw.angle, 3)), offset)
 
 
 def make_bin_goal(
-    cell: Cell, bin_name: str, item: Item, held_yaw: Yaw | None, drop_height: float = DROP_HEIGHT
+    cell: Cell, bin_name: str, item: Item, held: HeldPose | None, drop_height: float = DROP_HEIGHT
 ) -> Goal:
     """Return the tool goal at which `item` is `drop_height` [m] above the next slot of a bin.
 
-    Fingers that open there do not hit walls or objects, if there is such a yaw. `held_yaw` is the yaw of the
-    item relative to the tool.
+    Fingers that open there do not hit walls or objects, if there is such a yaw. `held` is the place of the
+    item relative to the tool. If the bin needs a yaw, the middle of the item is above that of the slot.
 
     Raises:
         Blocked: The bin needs the yaw of the item, which is unknown or at which the fingers would hit
@@ -113,7 +128,12 @@ def make_bin_goal(
     hold_height = cell.tool_model.get_hold_height(object_class)
     thickness = find_layer_thickness(cell, bin_name)
     goal = make_slot_goal(cell.bins[bin_name], slot_index, hold_height, thickness, drop_height)
-    yaws = _list_place_yaws(cell, bin_name, item, held_yaw)
+    yaws = _list_place_yaws(cell, bin_name, item, held.yaw if held else None)
+    if yaws and held and math.hypot(*held.offset) > MAX_IGNORED_OFFSET:
+        yaws = yaws[:1]
+        shift = make_tool_down_pose(goal.position, yaws[0]).rotation @ [*held.offset, 0.0]
+        x, y, z = (np.array(goal.position) - shift * [1, 1, 0]).tolist()
+        goal = replace(goal, position=(x, y, z))
     opening = cell.tool_model.compute_release_opening(object_class)
     free_yaws, blocker = find_free_yaws(
         cell.tool_model,

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os.path
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -35,6 +36,22 @@ CALIBRATION_KEYS: Mapping[str, str] = {
 
 MAX_BASE_COUNT = 5
 """Maximum number of files in the chain of bases of a cell file."""
+
+
+class CellFileChecker(Protocol):
+    """Checks of cell files of one kind; `executive.station.check.CellChecker` implements them."""
+
+    def check(self, config: CellConfig, cell_folder: Path) -> Iterable[tuple[KeyPath, str]]:
+        """Yield key and message of each error that the validation of the cell file does not find."""
+
+    def labels(self, config: CellConfig, cell_folder: Path) -> Mapping[str, tuple[str, ...] | None]:
+        """Return the labels that each detector can report, by name; None if they are unknown."""
+
+    def compute_mass(self, section: ObjectConfig) -> float:
+        """Return the mass of the objects of a class [kg], 0 if it is unknown."""
+
+    def measure_hold(self, config: CellConfig, label: str) -> float:
+        """Return the largest force with which the tool can hold objects of a class [N], inf if unknown."""
 
 
 @dataclass(frozen=True)
@@ -317,7 +334,7 @@ def _resolve_model_files(
     errors = []
     models: list[Path] = []
 
-    def resolve(path: str, *key_path: str) -> str:
+    def resolve(path: str, *key_path: str | int) -> str:
         folder = paths.get(file.find_span(key_path).source, paths[file.source]).parent
         if path.startswith(PACKAGE_PREFIX):
             return path
@@ -332,10 +349,38 @@ def _resolve_model_files(
     for label, model in config.objects.items():
         urdf = resolve(model.urdf, "objects", label, "urdf")
         mesh = resolve(model.mesh, "objects", label, "mesh")
-        objects[label] = model.model_copy(update={"urdf": urdf, "mesh": mesh})
+        variants = tuple(
+            resolve(path, "objects", label, "variants", index) for index, path in enumerate(model.variants)
+        )
+        objects[label] = model.model_copy(update={"urdf": urdf, "mesh": mesh, "variants": variants})
+    detectors = {}
+    for name, detector in config.detectors.items():
+        # The options of a kind are unknown here; one of a base file may be the path of a file beside it.
+        options = {
+            key: resolve(value, "detectors", name, key)
+            for key, value in detector.options.items()
+            if isinstance(value, str)
+            and (source := file.find_span(("detectors", name, key)).source) != file.source
+            and os.path.isfile(paths.get(source, paths[file.source]).parent / value)
+        }
+        detectors[name] = detector.model_copy(update=options)
+    meshes = []
+    for index, pattern in enumerate(config.unknown.meshes):
+        keys = ("unknown", "meshes", index)
+        folder = paths.get(file.find_span(keys).source, paths[file.source]).parent
+        if os.path.isabs(pattern) or ".." in Path(pattern).parts:
+            resolve(pattern, *keys)  # finds the error
+            continue
+        names = sorted(str(path.relative_to(folder)) for path in folder.glob(pattern))
+        meshes += [resolve(name, *keys) for name in names]
+        if not names:
+            message = f"there is no file {pattern} beside the cell file"
+            errors.append(file.make_error(keys, "robot", message))
     arm = config.arm.model_copy(update={"urdf": resolve(config.arm.urdf, "arm", "urdf")})
     tool = config.tool.replace_paths(lambda path, *keys: resolve(path, "tool", *keys))
-    return config.model_copy(update={"objects": objects, "arm": arm, "tool": tool}), errors, models
+    unknown = config.unknown.model_copy(update={"meshes": tuple(meshes)})
+    sections = {"objects": objects, "unknown": unknown, "detectors": detectors, "arm": arm, "tool": tool}
+    return config.model_copy(update=sections), errors, models
 
 
 MAX_OVERLAP = 0.0005

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Annotated
 
 from pydantic import Field, TypeAdapter
 
-from executive.cell.config import CellConfig, ObjectConfig
+from executive.cell.config import CellConfig
 from executive.errors import InputError
 from executive.geometry import GRAVITY
 from executive.manipulation.grasps import find_free_yaws
 from executive.manipulation.tool_goals import MAX_ROLL_DISTANCE, make_slot_goal
 from executive.mission.analysis import CheckContext
-from executive.mission.cell_file import CellFile
+from executive.mission.cell_file import CellFile, CellFileChecker
 from executive.mission.check_nodes import check_constant
 from executive.mission.mission_file import Mission
 from executive.mission.ports import find_literals, find_problem
@@ -222,13 +222,13 @@ def check_quotas(context: CheckContext) -> Iterator[Finding]:
 
 
 def check_loads(
-    cell: CellFile, config: CellConfig, mission: Mission, compute_mass: Callable[[ObjectConfig], float] | None
+    cell: CellFile, config: CellConfig, mission: Mission, checker: CellFileChecker | None
 ) -> Iterator[Finding]:
     """Yield an error for each routed class that the tool cannot hold, or a warning if it may be dropped.
 
     The planner limits the accelerations so that the tool holds `safety_factor` times the force on the load,
-    but it never lifts with less than `min_lift_acceleration`. `compute_mass` is that of the checker; if
-    it is None, only classes with a declared mass are checked.
+    but it never lifts with less than `min_lift_acceleration`. Without a checker, only declared sizes and
+    masses are checked.
     """
     safety_factor = config.tool.safety_factor
     for label in sorted(mission.routes.keys() & config.objects.keys()):
@@ -243,7 +243,7 @@ def check_loads(
         span = cell.find_span(("objects", label, key))
         hint = "Correct the mass, delete the route, or use a tool with a larger force."
         try:
-            mass = compute_mass(section) if compute_mass else section.mass or 0.0
+            mass = checker.compute_mass(section) if checker else section.mass or 0.0
         except InputError as error:
             yield make_error(span, "robot", f"the mass of {label} is unknown: {error}", hint)
             continue
@@ -253,6 +253,11 @@ def check_loads(
         if weight > force:
             message = f"{problem} weighs {weight:.1f} N, more than the {force:g} N that the tool withstands"
             yield make_error(span, "too-heavy", message, hint)
+        elif checker and (measured := checker.measure_hold(config, label)) < weight:
+            grip = f"holds the surface of a {label} with at most {measured:.2g} N"
+            message = f"the tool {grip}, and its weight is {weight:.2g} N"
+            hint = "Give the class a better grasp point, delete the route, or use another tool."
+            yield make_error(cell.find_span(("objects", label), at_key=True), "robot", message, hint)
         elif pull > force / safety_factor:
             limit = f"{force:g} N / safety factor {safety_factor:g} = {force / safety_factor:.3g} N"
             message = f"{problem} pulls with {pull:.3g} N in the slowest lift, more than {limit}"
@@ -275,7 +280,9 @@ def check_slots(cell: CellFile, config: CellConfig, mission: Mission) -> Iterato
             message = f"images show no yaw of a {label} without a footprint, and {name} has a place_yaw_deg"
             hint = "Give the class a footprint, or yaw_symmetry: 0 if it is round."
             yield make_error(cell.find_span(("objects", label), at_key=True), "layout", message, hint)
-        radius = section.radius + section.ring + config.motion.margin
+        # The tool is beside the middle of the slot if the object is held beside its middle.
+        offset = section.build_class(label).contact_radius * (1 if bin.place_yaw_deg is None else 2)
+        radius = section.radius + offset + config.motion.margin
         for axis, size, count in zip("xy", bin.size, bin.slots, strict=False):
             min_size = radius + max(radius, obstacle_radius if count > 1 else 0.0)
             if size / count < min_size:

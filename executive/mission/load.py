@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 from collections import ChainMap
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from itertools import islice
 from pathlib import Path
-from typing import Protocol, cast
+from typing import cast
 
 from pydantic import JsonValue
 
 from executive.behaviours import Skills
-from executive.cell.config import CellConfig, ObjectConfig
+from executive.cell.config import CellConfig
 from executive.cell.objects import Quotas
 from executive.cell.protocols import Cell
 from executive.errors import InputError
 from executive.events import Emit
 from executive.mission import check_nodes, check_skills, check_variables
 from executive.mission.analysis import CheckContext, UnhandledFailure, find_unhandled_failures
-from executive.mission.cell_file import CellFile, read_cell
+from executive.mission.cell_file import CellFile, CellFileChecker, read_cell
 from executive.mission.expand import assign_paths, expand
 from executive.mission.grammar import SEQUENCE_KEYWORD
 from executive.mission.mission_file import Mission, Subtree, parse_library, parse_mission
@@ -31,7 +31,6 @@ from executive.perception.detectors.envelope import find_envelopes
 from executive.skill import Direction, Param, Port, Skill
 from executive.text.files import find_cell, find_file_below, find_mission, get_shipped_folder, read_source
 from executive.text.findings import Finding, MissionError, Source, make_warning, sort_findings
-from executive.text.validate import KeyPath
 from executive.text.yaml_files import parse_yaml
 from executive.tree.blackboard import Blackboard, NodeContext, Wiring
 from executive.tree.node import ControlNode, load_control_nodes
@@ -166,19 +165,6 @@ def _add_library(
     return source.text
 
 
-class CellFileChecker(Protocol):
-    """Checks of cell files of one kind; `executive.station.check.CellChecker` implements them."""
-
-    def check(self, config: CellConfig, cell_folder: Path) -> Iterable[tuple[KeyPath, str]]:
-        """Yield key and message of each error that the validation of the cell file does not find."""
-
-    def labels(self, config: CellConfig, cell_folder: Path) -> Mapping[str, tuple[str, ...] | None]:
-        """Return the labels that each detector can report, by name; None if they are unknown."""
-
-    def compute_mass(self, section: ObjectConfig) -> float:
-        """Return the mass of the objects of a class [kg], 0 if it is unknown."""
-
-
 CheckerFinder = Callable[[str], CellFileChecker]
 """Function that returns the checker of cells with a driver; raises InputError if it is not installed."""
 
@@ -285,8 +271,7 @@ def load_mission(
             findings += cell_findings
             classes_by_detector = dict(checker.labels(config, folder))
             # The computation would fail for an invalid model.
-            compute_mass = None if cell_findings else checker.compute_mass
-            findings += check_skills.check_loads(cell, config, mission, compute_mass)
+            findings += check_skills.check_loads(cell, config, mission, None if cell_findings else checker)
             findings += check_skills.check_slots(cell, config, mission)
     predefined_lists: dict[str, Sequence[str]] = {}
     if config is not None:

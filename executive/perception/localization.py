@@ -88,8 +88,11 @@ class CellLocalizer:
             std = max(std, UNKNOWN_POSITION_STD)
         elif not is_doubtful:
             contradiction = self._describe_contradiction(detections, detection, position)
-            if self.measures_yaw:
-                yaw = measure_yaw(detections, detection, position, self.classes[detection.label])
+            object_class = self.classes[detection.label]
+            if self.measures_yaw and (found := measure_yaw(detections, detection, position, object_class)):
+                yaw, middle = found
+                if object_class.grasp_points:
+                    position = middle
         is_confident = not (is_doubtful or contradiction)
         return Observation(detection, position, std, frame.stamp, is_confident, contradiction, yaw)
 

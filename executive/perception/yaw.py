@@ -35,9 +35,10 @@ SIDE_TOLERANCE_PX = 2.0
 SIDE_TOLERANCE = 0.1
 """Maximum distance between a side of an outline and the same side of the box, relative to its longer side."""
 MIN_AREA_FRACTION = 0.4
-"""Minimum area of an outline, as a fraction of that of its class."""
+"""Minimum area of the convex hull of an outline, as a fraction of the area of its class."""
 MAX_AREA_FACTOR = 1.3
-"""Maximum area of an outline, as a multiple of the largest area of a prism over the outline of its class."""
+"""Maximum area of the convex hull of an outline, as a multiple of the largest area of a prism over the
+outline of its class."""
 COLOUR_OUTLINE_STD = 0.25
 """Standard deviation of an outline by colour [pixel]; its errors are independent at distances of a pixel.
 
@@ -60,7 +61,7 @@ UNEVEN_OBLIQUE_FRACTION = 0.07
 MAX_PHASE_STD = 0.5
 """Maximum standard deviation of the angle of a moment [rad]; that of a round outline is larger."""
 MIN_SKEWNESS = 0.05
-"""Minimum skewness of an outline along its longer axis with which its ends are distinguished.
+"""Minimum skewness of an outline with which its ends are distinguished, or the sides of a bent object.
 
 In rendered images, the skewnesses of 51 bolts were 0.17 to 0.25, those of 83 ducks at most 0.15. From 0.04
 on, all had the same sign; below, a third of the ducks had the other sign.
@@ -69,8 +70,11 @@ on, all had the same sign; below, a third of the ducks had the other sign.
 
 def measure_yaw(
     look: Detections, detection: Detection, position: Array, object_class: ObjectClass
-) -> Yaw | None:
-    """Return the yaw of a detected object in the world.
+) -> tuple[Yaw, Array] | None:
+    """Return the yaw of a detected object in the world, and the middle of its outline `(3,)` [m].
+
+    The middle is that of the rectangle around the outline with sides along the axes of the object. The middle
+    of the box is beside it if an object without symmetry lies obliquely in the image.
 
     The result is None for a round object, for a truncated or occluded box, and without a plausible outline.
     The yaw of an object without symmetry has the symmetry 2 if its two ends cannot be distinguished.
@@ -93,12 +97,21 @@ def measure_yaw(
     max_distance = SIDE_TOLERANCE_PX + SIDE_TOLERANCE * (box_sides[2:] - box_sides[:2]).max()
     for outline, std in _find_outlines(detection, frame, position, object_class):
         sides = np.concatenate([outline.min(axis=0), outline.max(axis=0)])
-        area = cv2.contourArea(outline.astype(np.float32)) * pixel_size**2
+        # Scissors cover a quarter of their footprint, but their convex hull more than half of it.
+        area = cv2.contourArea(cv2.convexHull(outline.astype(np.float32))) * pixel_size**2
         has_area = MIN_AREA_FRACTION * object_class.outline_area <= area <= MAX_AREA_FACTOR * max_area
         if has_area and np.abs(sides - box_sides).max() <= max_distance:
             density = (std * pixel_size) ** 2 * pixel_size
             density += (oblique_fraction * top_shift) ** 2 * object_class.height
-            return _compute_yaw(_project_outline(outline, frame, float(position[2])), density, object_class)
+            vertices, centroid = _project_outline(outline, frame, float(position[2]))
+            yaw = _compute_yaw(vertices, density, object_class)
+            if yaw is None:
+                return None
+            axis = np.exp(1j * yaw.angle)
+            turned = vertices / axis
+            extremes = [(each.min() + each.max()) / 2 for each in (turned.real, turned.imag)]
+            middle = centroid + (extremes[0] + 1j * extremes[1]) * axis
+            return yaw, np.array([middle.real, middle.imag, position[2]])
     return None
 
 
@@ -168,8 +181,8 @@ def _apply_grab_cut(crop: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return (labels & cv2.GC_FGD).astype(np.uint8)
 
 
-def _project_outline(outline: Array, frame: Frame, height: float) -> Vertices:
-    """Return the projection of an outline `(N, 2)` [pixel] to the plane at a height [m]."""
+def _project_outline(outline: Array, frame: Frame, height: float) -> tuple[Vertices, complex]:
+    """Return the projection of an outline `(N, 2)` [pixel] to the plane at a height, and its centroid [m]."""
     pixels = np.column_stack([outline, np.ones(len(outline))])
     rays = pixels @ np.linalg.inv(frame.matrix).T @ frame.X_WC.rotation.T
     points = rays[:, :2] * ((height - frame.X_WC.position[2]) / rays[:, 2:])
@@ -178,7 +191,8 @@ def _project_outline(outline: Array, frame: Frame, height: float) -> Vertices:
     doubled_areas = (vertices.conj() * following).imag  # of the triangles of the edges and the origin
     centroid = (doubled_areas * (vertices + following)).sum() / (3 * doubled_areas.sum())
     vertices = vertices - centroid
-    return vertices if doubled_areas.sum() > 0 else vertices[::-1]
+    place = complex(centroid + frame.X_WC.position[0] + 1j * frame.X_WC.position[1])
+    return vertices if doubled_areas.sum() > 0 else vertices[::-1], place
 
 
 def _compute_yaw(vertices: Vertices, density: float, object_class: ObjectClass) -> Yaw | None:
@@ -202,17 +216,25 @@ def _compute_yaw(vertices: Vertices, density: float, object_class: ObjectClass) 
         return None
     axis = np.angle(moment) / order
     if symmetry == 1:
-        skewness = _compute_skewness(vertices * np.exp(-1j * axis))
+        skewness = choose_skewness(vertices * np.exp(-1j * axis))
         if skewness < 0:
             axis += math.pi
-        symmetry = 1 if abs(skewness) >= MIN_SKEWNESS else 2
+        symmetry = 1 if skewness else 2
     angle = math.remainder(float(axis) - object_class.yaw_offset, math.tau / symmetry)
     return Yaw(angle, moment_std / float(abs(moment)) / order, symmetry)
 
 
-def _compute_skewness(vertices: Vertices) -> float:
-    """Return the skewness of the enclosed area along the x axis."""
+def choose_skewness(vertices: Vertices) -> float:
+    """Return the skewness of the enclosed area by which a half turn is recognized; 0 if there is none.
+
+    It is the skewness along the x axis, the longer one, or, if the ends look alike, that along the y axis.
+    """
     # The unit millimetre keeps single-precision moments in range.
     points = np.column_stack([vertices.real, vertices.imag]) * 1000
     moments = cv2.moments(points.astype(np.float32).reshape(-1, 1, 2))
-    return float(moments["mu30"] * math.sqrt(moments["m00"]) / moments["mu20"] ** 1.5)
+    for axis in ("mu{}0", "mu0{}"):
+        variance, cube = (moments[axis.format(power)] for power in (2, 3))
+        skewness = float(cube * math.sqrt(moments["m00"]) / variance**1.5)
+        if abs(skewness) >= MIN_SKEWNESS:
+            return skewness
+    return 0.0

@@ -19,7 +19,7 @@ from executive.errors import Blocked, Fault, Interrupted, Stopped, describe_erro
 from executive.events import Event, Observer, RunEnded, RunStarted, TimedEvent
 from executive.ledger.final_states import is_balanced
 from executive.ledger.tracker import Tracker
-from executive.manipulation.grasps import choose_grasp, make_bin_goal, measure_held_yaw
+from executive.manipulation.grasps import choose_grasp, make_bin_goal, measure_held_pose
 from executive.manipulation.motions import make_transport_task
 from executive.manipulation.tool_goals import sort_by_tour, sort_pickable_targets
 from executive.processes import shorten_collections
@@ -419,8 +419,8 @@ class LookaheadPlanner:
             # `Transit` reports a yaw that is unknown or impossible.
             with suppress(Blocked):
                 target = next((each for each in cell.ledger.find_targets() if each.item == item), None)
-                held_yaw = measure_held_yaw(cell, target) if target else None
-                goal = make_bin_goal(cell, bin, item, held_yaw)
+                held_pose = measure_held_pose(cell, target) if target else None
+                goal = make_bin_goal(cell, bin, item, held_pose)
                 cell.arm.plan_ahead(goal, make_transport_task(cell, item))
         elif self._change_tick not in (None, tick) and self._held_item and self._is_moving_to_bin():
             self._change_tick = None

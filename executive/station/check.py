@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class CellChecker:
-    """Checks cell files of one kind; implements `executive.mission.load.CellFileChecker`.
+    """Checks cell files of one kind; implements `executive.mission.cell_file.CellFileChecker`.
 
     Attributes:
         kind: Kind of the driver of the cells.
@@ -78,6 +78,11 @@ class CellChecker:
         """
         compute_mass = getattr(self.kind, "compute_mass", None)
         return float(compute_mass(section)) if compute_mass else section.mass or 0.0
+
+    def measure_hold(self, config: CellConfig, label: str) -> float:
+        """Return the largest force with which the tool can hold objects of a class [N], inf if unknown."""
+        measure_hold = getattr(self.kind, "measure_hold", None)
+        return float(measure_hold(config, label)) if measure_hold else math.inf
 
 
 def load_checker(kind: str) -> CellChecker:

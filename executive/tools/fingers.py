@@ -265,7 +265,10 @@ class Fingers(ToolModel):
         if self.depth and object_class.flat_top:
             depth = self.depth
         lowest = max(self.tip + MIN_TIP_HEIGHT, object_class.height - depth)
-        return max(object_class.grip_height or object_class.height / 2, lowest)
+        height = object_class.grip_height or object_class.height / 2
+        if object_class.grasp_points:
+            height = object_class.hold_height
+        return max(height, lowest)
 
     def compute_release_opening(self, object_class: ObjectClass) -> float:
         """Return the width of an object, and the allowance of a release on both sides [m]."""
@@ -280,7 +283,7 @@ class Fingers(ToolModel):
         The open fingers move down on both sides of the object; a contact on the way is a failure. If the
         angle of an object is unknown, its circle around the outline counts.
         """
-        x, y, z = map(float, target.pose_at(target.stamp).position)
+        z = float(target.pose_at(target.stamp).position[2])
         # A wrong depth image shows objects below the table, on which they cannot lie.
         bottom = max(z - object_class.height / 2, 0.0)
         end_height = bottom + self.get_hold_height(object_class)
@@ -292,7 +295,11 @@ class Fingers(ToolModel):
             raise Blocked(f"{target.item} {cause}")
         grasps = []
         widths = self._list_widths(object_class) if yaw else [(2 * object_class.radius, ())]
-        for width, directions in widths:
+        places = self.list_points(object_class, target)
+        # Each grasp point has a width of its own; without grasp points, the middle has several.
+        has_points = bool(object_class.grasp_points)
+        pairs = zip(places if has_points else places * len(widths), itertools.cycle(widths), strict=False)
+        for (_, (x, y, _)), (width, directions) in pairs:
             opening = width + 2 * self.allowance + attempt.number * OPENING_STEP
             yaws: tuple[float, ...] = ()
             if yaw and directions:
@@ -300,7 +307,7 @@ class Fingers(ToolModel):
                 opening += 2 * object_class.radius * math.sin(min(TOLERATED_YAW_ERROR * yaw.std, math.pi / 4))
                 yaws = tuple(yaw.angle + direction for direction in directions)
             goal = Goal(
-                (x, y, end_height),
+                (float(x), float(y), end_height),
                 yaws,
                 guarded_length=start_height - end_height,
                 guarded_speed=self.descent_speed,
@@ -350,6 +357,12 @@ class Fingers(ToolModel):
 
         The yaws [rad] of a round object are (): every yaw is permitted.
         """
+        if object_class.grasp_points and object_class.yaw_symmetry:
+            sides = object_class.footprint or (2 * object_class.radius,)
+            return [
+                (point.width or min(sides), (point.direction - math.pi / 2, point.direction + math.pi / 2))
+                for point in object_class.grasp_points
+            ]
         footprint = object_class.footprint
         if footprint is None or not object_class.yaw_symmetry:
             return [(2 * object_class.radius, ())]

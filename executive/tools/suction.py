@@ -61,6 +61,8 @@ class Suction(ToolModel):
     """Angle between surface normal and tool axis at which the breakaway force is zero [degree]."""
     min_force: Force
     """Minimum breakaway force at which the vacuum sensor reports a seal [N]."""
+    stroke: Length = 0.0025
+    """Distance by which a force of `force` compresses the bellows; more does not compress it further [m]."""
     touch_tolerance: Length = 0.003
     """Maximum difference between the height of a touch and the height of a class [m]."""
 
@@ -75,6 +77,12 @@ class Suction(ToolModel):
         """Breakaway force of a perfect seal [N]."""
         return self.force
 
+    def measure_hold(self, client: Any, X_WT: Pose, body: int) -> float:
+        """Return the breakaway force of the seal on a body; 0 if the sensor would report no seal."""
+        contact = measure_contact(client, X_WT, [body], self.cup_radius, self.reach)
+        force = compute_breakaway_force(contact, self)
+        return force if force >= self.min_force else 0.0
+
     def list_grasps(
         self, object_class: ObjectClass, target: Target, motion: MotionConfig, attempt: GraspAttempt
     ) -> tuple[GraspPose]:
@@ -85,16 +93,20 @@ class Suction(ToolModel):
         because the item may be a false detection.
         """
         x, y, z = map(float, target.pose_at(target.stamp).position)
+        places = self.list_points(object_class, target)
+        point, place = places[attempt.number % len(places)]
         # After n failed attempts, the contact point on a solid object lies on a Vogel spiral, at the distance
         # spacing * sqrt(n) and the angle n * GOLDEN_ANGLE; on an object with a hole, it lies on the ring.
-        angle = attempt.number * GOLDEN_ANGLE
-        distance = object_class.contact_radius or attempt.spacing * math.sqrt(attempt.number)
-        contact_x = x + distance * math.cos(angle)
-        contact_y = y + distance * math.sin(angle)
-        end_height = _compute_min_contact_height(object_class, z, attempt.overtravel)
+        round_number = attempt.number // len(places)
+        angle = round_number * GOLDEN_ANGLE
+        ring = 0.0 if object_class.grasp_points else object_class.contact_radius
+        distance = ring or attempt.spacing * math.sqrt(round_number)
+        contact_x = float(place[0]) + distance * math.cos(angle)
+        contact_y = float(place[1]) + distance * math.sin(angle)
+        end_height = _compute_min_contact_height(object_class, z, attempt.overtravel, point.position[2])
         if attempt.number >= ATTEMPTS_BEFORE_PROBE:
             end_height = min(end_height, z - object_class.height / 2 + PROBE_CLEARANCE)
-        guarded_length = z + object_class.height / 2 + motion.descent - end_height
+        guarded_length = float(place[2]) + motion.descent - end_height
         is_fast = attempt.is_confirmed and not attempt.number
         goal = Goal(
             (contact_x, contact_y, end_height),
@@ -123,23 +135,25 @@ class Suction(ToolModel):
         class, no class has this height, and the top is not flat.
         """
         tolerance = self._get_tolerance(object_class)
-        if min(abs(height - top) for top in object_class.top_heights) <= tolerance:
+        if min(abs(height - each) for each in object_class.touch_heights) <= tolerance:
             return ToolMeasurement()
         contradiction = (
             f"it was touched {height * 1000:.0f} mm above the table, and a {object_class.label} is "
             f"{object_class.height * 1000:.0f} mm high"
         )
-        is_near_top = height >= _compute_min_contact_height(object_class, float(position[2]), overtravel)
-        fits_no_class = all(
-            abs(height - top) > OTHER_CLASS_TOLERANCE for each in classes.values() for top in each.top_heights
+        lowest_point = min((point.position[2] for point in object_class.grasp_points), default=None)
+        is_near_top = height >= _compute_min_contact_height(
+            object_class, float(position[2]), overtravel, lowest_point or object_class.height
         )
-        is_low = height < object_class.height
+        touch_heights = [touch_height for each in classes.values() for touch_height in each.touch_heights]
+        fits_no_class = min(abs(height - each) for each in touch_heights) > OTHER_CLASS_TOLERANCE
+        is_low = height < object_class.hold_height
         may_be_wrong = is_near_top and is_low and fits_no_class and not object_class.flat_top
         return ToolMeasurement(contradiction, may_be_wrong, is_miss=not is_near_top)
 
     def find_distinct_labels(self, classes: Mapping[str, ObjectClass]) -> frozenset[str]:
         """Return the classes with which a touch at the height of any other class does not agree."""
-        heights = np.array([object_class.height for object_class in classes.values()])
+        heights = np.array([object_class.hold_height for object_class in classes.values()])
         tolerances = np.array([self._get_tolerance(object_class) for object_class in classes.values()])
         counts = (np.abs(heights[:, None] - heights) <= tolerances[:, None]).sum(axis=1)
         return frozenset(label for label, count in zip(classes, counts, strict=True) if count == 1)
@@ -160,15 +174,29 @@ class Suction(ToolModel):
             force = compute_breakaway_force(contact, self)
             return (contact.body, force) if contact is not None and force >= self.min_force else None
 
-        return SimTool(world, self, find_grip, self.reach, noise_seed)
+        # The vacuum of a perfect seal just contracts the bellows. F. Gabriel et al., Production Engineering
+        # 14 (2020): the deformation of a bellows cup is elastic.
+        return SimTool(
+            world,
+            self,
+            find_grip,
+            self.reach,
+            noise_seed,
+            stroke=self.stroke,
+            stiffness=self.force / self.stroke,
+        )
 
 
-def _compute_min_contact_height(object_class: ObjectClass, centre_height: float, overtravel: float) -> float:
+def _compute_min_contact_height(
+    object_class: ObjectClass, centre_height: float, overtravel: float, point_height: float
+) -> float:
     """Return the minimum height of a contact with an object [m]; a lower contact misses the object.
 
-    The guarded motion continues below the expected surface by `overtravel` [m], at most to the centre.
+    The guarded motion continues below the expected surface, `point_height` above the underside, by
+    `overtravel` [m], at most halfway to the underside.
     """
-    return max(centre_height + object_class.height / 2 - overtravel, centre_height)
+    middle = centre_height + (point_height - object_class.height) / 2
+    return max(middle + point_height / 2 - overtravel, middle)
 
 
 RIM_RAY_COUNT = 16

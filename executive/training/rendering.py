@@ -68,7 +68,7 @@ def generate_dataset(
     cells: Sequence[CellConfig], out: Path, *, image_count: int, seed: int, layout: str,
     worker_count: int, valid_fraction: float, progress: ReportProgress,
 ) -> None:  # fmt: skip
-    """Write a dataset of random scenes; the scenes alternate between the cells.
+    """Write a dataset of random scenes, in turn of each cell, with the classes of all cells.
 
     Args:
         cells: The cells.
@@ -81,19 +81,16 @@ def generate_dataset(
         progress: Called after each block of `BLOCK_SIZE` images.
 
     Raises:
-        InputError: The cells differ in their classes, a model of an object or arm is missing
-            or invalid, an object has another size than in the cell file, or a file cannot be written.
+        InputError: A model of an object or arm is missing or invalid, an object has another size than in the
+            cell file, or a file cannot be written.
     """
-    classes = list(cells[0].objects)
-    if any(list(cell.objects) != classes for cell in cells):
-        found = "; ".join(f"{cell.cell} has {', '.join(cell.objects)}" for cell in cells)
-        raise InputError(f"the cells of one dataset must have the same classes in the same order; {found}")
     for cell in cells:
         for key, message in (*models.find_model_errors(cell), *find_arm_model_errors(cell.arm)):
             raise InputError(f"{cell.cell}: {'.'.join(map(str, key))}: {message}")
     train_count = image_count - round(image_count * valid_fraction)
     render_block = partial(_render_dataset_images, cells, out, layout, seed, train_count)
     entries = _render_blocks(render_block, image_count, worker_count, progress)
+    classes = list(dict.fromkeys(label for cell in cells for label in cell.objects))
     dataset.write_annotations(out, layout, entries, classes)
 
 

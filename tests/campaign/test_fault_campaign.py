@@ -29,8 +29,8 @@ SLOW = pytest.mark.slow
 MISSION = """\
 mission: small
 description: One object, if there is one.
-cell: cells/fruit.yaml
-routes: {apple: premium_crate, banana: premium_crate, orange: market_crate, lemon: juice_crate}
+cell: cells/kitting.yaml
+routes: {bolt: tray_1, nut: tray_2, washer: scrap_bin}
 
 tree:
   try:
@@ -58,7 +58,7 @@ def campaign() -> Campaign:
 def small(tmp_path_factory: pytest.TempPathFactory) -> MissionUnderTest:
     folder = tmp_path_factory.mktemp("small")
     (folder / "cells").mkdir()
-    shutil.copy(Path(__file__).parents[2] / "missions" / "cells" / "fruit.yaml", folder / "cells")
+    shutil.copy(Path(__file__).parents[2] / "missions" / "cells" / "kitting.yaml", folder / "cells")
     (folder / "small.yaml").write_text(MISSION)
     loaded = load_mission(folder / "small.yaml", load_skills(), {"cell.table.objects": "[1, 1]"})
     return MissionUnderTest(loaded, FakeCell, "fake", 0)

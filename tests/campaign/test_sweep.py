@@ -188,7 +188,7 @@ def test_halted_runs_are_not_stored(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 
 @pytest.mark.parametrize(
-    ("mission", "size"), [("sort_fruit", "[2, 2]"), pytest.param("sort_overhead", "[1, 1]", marks=SLOW)]
+    ("mission", "size"), [("kit_fasteners", "[2, 2]"), pytest.param("sort_overhead", "[1, 1]", marks=SLOW)]
 )
 def test_the_run_of_a_worker_is_equal_to_a_single_run(mission: str, size: str, tmp_path: Path) -> None:
     settings = replace(

@@ -38,13 +38,13 @@ def compare(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., Re
 
 
 def test_each_side_may_have_a_cell_of_its_own(compare) -> None:
-    shown = compare("sort_fruit", "--seeds", "0:2", "--cell-b", "fruit", "--json")
-    assert [each["replacing_cell"] for each in json.loads(shown.stdout)["settings"]] == ["", "fruit"]
-    refused = compare("sort_fruit", "--seeds", "0:2", "--cell-b", "fruit", "--cell", "fruit")
+    shown = compare("kit_fasteners", "--seeds", "0:2", "--cell-b", "kitting", "--json")
+    assert [each["replacing_cell"] for each in json.loads(shown.stdout)["settings"]] == ["", "kitting"]
+    refused = compare("kit_fasteners", "--seeds", "0:2", "--cell-b", "kitting", "--cell", "kitting")
     assert "omit it, or omit --cell-a and --cell-b" in refused.output
 
 
-LOSS = ("sort_fruit", "--seeds", "0:10", "--set", "cell.kind=fake", "--set-b", "cell.table.objects=[1, 1]")
+LOSS = ("kit_fasteners", "--seeds", "0:10", "--set", "cell.kind=fake", "--set-b", "cell.table.objects=[1, 1]")
 
 
 def test_a_loss_is_detected_and_both_reports_are_linked(compare, tmp_path: Path) -> None:
@@ -72,7 +72,7 @@ def test_a_loss_is_detected_and_both_reports_are_linked(compare, tmp_path: Path)
 
 
 def test_a_mission_compared_with_itself_and_resumed(compare) -> None:
-    first = compare("sort_fruit", "--seeds", "0:4", "--json")
+    first = compare("kit_fasteners", "--seeds", "0:4", "--json")
     figures = json.loads(first.stdout)
     assert [(one["difference"], one["low"], one["high"]) for one in figures["differences"]] == [(0, 0, 0)] * 3
     again = compare("--resume", str(Path(figures["page"]).parent), "--json")

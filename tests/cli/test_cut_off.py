@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from at_terminal import invoke
 
-OBJECTS = ("--set", "cell.table.objects=[1, 1]")
+OBJECTS = ("--set", "cell.kind=fake", "--set", "cell.table.objects=[1, 1]")
 
 
 def start(*words: str) -> subprocess.Popen[str]:

@@ -110,7 +110,7 @@ def test_a_weak_measurement_is_printed_but_stored_by_force_only(dataset, tmp_pat
         (("--labels", "names.txt"), "--labels needs a model file; name it with --weights"),
         (("--out", "o.json"), "--out o.json needs exactly one --cell"),
         (("--set", "attempts=3"), "--set attempts is not a key of a cell; write cell.KEY.KEY=VALUE"),
-        (("--cell", "fruit"), "fruit is of kind fake; measure its detector on your own images"),
+        (("--cell", "kitting"), "kitting is of kind fake; measure its detector on your own images"),
         (("--dataset", "grey", "--cell", "fasteners"), "is a class of detector fasteners"),
         (("--sheet", "sheet.gif"), "must end in .png, .jpg, .jpeg"),
     ],

@@ -8,10 +8,12 @@ from pathlib import Path
 import pytest
 from at_terminal import invoke
 
+FAKE = ("--set", "cell.kind=fake")
+
 
 @pytest.mark.slow
 def test_a_replay_says_what_is_decided_otherwise(tmp_path: Path) -> None:
-    assert invoke("run", "sort_fruit", "--seed", "4", "--quiet", "--runs", tmp_path).exit_code == 0
+    assert invoke("run", "sort_fruit", *FAKE, "--seed", "4", "--quiet", "--runs", tmp_path).exit_code == 0
     path = (tmp_path / "latest").resolve()
     same = invoke("replay", "latest", "--runs", tmp_path)
     assert same.exit_code == 0

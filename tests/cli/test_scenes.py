@@ -65,7 +65,7 @@ def test_a_sweep_runs_every_seed_in_the_scene(sort: str, scene: Path, tmp_path: 
     assert [each["audit"]["left"] for each in json.loads(done.stdout)["runs"]] == [1, 1]
 
 
-@pytest.mark.parametrize("command", ["run sort_fruit", "sweep sort_fruit --seeds 0-3"])
+@pytest.mark.parametrize("command", ["run kit_fasteners", "sweep kit_fasteners --seeds 0-3"])
 def test_a_cell_that_is_not_simulated_takes_no_scene(command: str, scene: Path, tmp_path: Path) -> None:
     refused = invoke(*command.split(), "--scene", str(scene), "--runs", str(tmp_path / "runs"))
     assert (refused.exit_code, refused.stdout) == (2, "")

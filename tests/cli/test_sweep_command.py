@@ -41,7 +41,7 @@ def sweep(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., Resu
                 store(job.index, make_record(job, status), 0)
 
         monkeypatch.setattr("executive.campaign.sweep.run_jobs", run_jobs)
-        folder = () if "--resume" in words else ("sort_fruit", "--runs", str(tmp_path / "runs"))
+        folder = () if "--resume" in words else ("kit_fasteners", "--runs", str(tmp_path / "runs"))
         return invoke("sweep", *folder, *words)
 
     return sweep_with
@@ -74,7 +74,7 @@ def test_the_summary_shows_every_variant_and_how_to_repeat_a_failure(sweep: Call
         "number in the right bin 4 of 4 4 of 4",
         "Grasp, per run [s] 0.50 (2 of 4 failed) 0.50 (2 of 4 failed)",
         "with cell.table.objects=[2, 2]: 1 run: FAULT Grasp.missed at tree/Grasp: no seal seeds 3; repeat",
-        "the first: executive run sort_fruit --seed 3 --set 'cell.table.objects=[2, 2]'",
+        "the first: executive run kit_fasteners --seed 3 --set 'cell.table.objects=[2, 2]'",
     ):
         assert line in text
 
@@ -92,14 +92,14 @@ def test_a_run_that_failed_because_of_the_disk_is_repeated(
     sweep: Callable[..., Result], tmp_path: Path
 ) -> None:
     assert sweep("SUCCESS DISK", "--seeds", "0:2").exit_code == 3
-    (folder,) = (tmp_path / "runs").glob("*/*_sweep_sort_fruit")
+    (folder,) = (tmp_path / "runs").glob("*/*_sweep_kit_fasteners")
     assert sweep("SUCCESS", "--resume", str(folder)).exit_code == 0
 
 
 def test_a_dry_run_lists_the_files_that_would_travel(sweep: Callable[..., Result], tmp_path: Path) -> None:
     first, *files = sweep("", "--seeds", "0:2", "--dry-run", "--cluster", "tcp://a:1").stderr.splitlines()
-    assert first == f"2 runs of sort_fruit; {len(files)} files travel"
-    assert any(file.endswith("cells/fruit.yaml") for file in files) and not (tmp_path / "runs").exists()
+    assert first == f"2 runs of kit_fasteners; {len(files)} files travel"
+    assert any(file.endswith("cells/kitting.yaml") for file in files) and not (tmp_path / "runs").exists()
 
 
 def test_nested_values_of_vary_are_refused(sweep: Callable[..., Result]) -> None:
@@ -108,7 +108,7 @@ def test_nested_values_of_vary_are_refused(sweep: Callable[..., Result]) -> None
 
 def test_a_resumed_sweep_reports_all_runs(sweep: Callable[..., Result], tmp_path: Path) -> None:
     assert sweep("SUCCESS FAILURE", "--seeds", "0:3").exit_code == 130
-    (folder,) = (tmp_path / "runs").glob("*/*_sweep_sort_fruit")
+    (folder,) = (tmp_path / "runs").glob("*/*_sweep_kit_fasteners")
     shown = sweep("FAULT", "--resume", str(folder), "--junit", str(tmp_path / "junit.xml"))
     assert (shown.exit_code, "1 of 3 runs succeeded" in shown.stderr) == (0, True)
     assert len(list(ElementTree.parse(tmp_path / "junit.xml").iter("testcase"))) == 3

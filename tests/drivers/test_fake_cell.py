@@ -108,12 +108,12 @@ def test_places_out_of_reach_and_too_many_objects_are_reported(load: Load) -> No
 
 
 @pytest.mark.parametrize(
-    ("x", "what"), [(0.362, "right"), (0.374, "elsewhere"), (0.39, "elsewhere"), (0.34, "right")]
+    ("x", "what"), [(0.358, "right"), (0.373, "elsewhere"), (0.39, "elsewhere"), (0.34, "right")]
 )
 def test_what_fell_between_two_bins_is_in_the_nearer(load: Load, x: float, what: str) -> None:
-    """The premium crate ends at 0.36 m, and the market crate begins at 0.37 m."""
-    cell = FakeCell(load("fruit", table__objects="[0, 0]"), routes={"banana": ("premium_crate",)})
-    cell.world.put("banana", x, 0.4).is_dropped = True
+    """Tray 1 ends at 0.35 m, and tray 2 begins at 0.38 m."""
+    cell = FakeCell(load("kitting", table__objects="[0, 0]"), routes={"bolt": ("tray_1",)})
+    cell.world.put("bolt", x, 0.4).is_dropped = True
     assert {count: n for count, n in cell.audit().items() if n and count not in AUDIT_KEYS[-2:]} == {what: 1}
 
 

@@ -12,7 +12,7 @@ from executive.cell.config import BinConfig, CellConfig
 from executive.cell.devices import TrueObject
 from executive.errors import Blocked
 from executive.events import TimedEvent
-from executive.geometry import Yaw, compute_tool_yaw, make_tool_down_pose
+from executive.geometry import HeldPose, Yaw, compute_tool_yaw, make_tool_down_pose
 from executive.manipulation.grasps import make_bin_goal
 from executive.manipulation.tool_goals import find_layer_thickness
 from executive.mission.cell_file import load_cell
@@ -60,8 +60,8 @@ def test_fingers_turn_the_sides_of_an_object_parallel_to_the_pads(missions: Path
     assert held_yaw.angle == pytest.approx(math.pi / 2)
 
 
-@pytest.mark.parametrize("held_yaw", [None, Yaw(0.0, 0.1, 2)])
-def test_an_unknown_yaw_blocks_the_transit_but_not_that_of_a_round_object(missions, held_yaw) -> None:
+@pytest.mark.parametrize("held_pose", [None, HeldPose(Yaw(0.0, 0.1, 2))])
+def test_an_unknown_yaw_blocks_the_transit_but_not_that_of_a_round_object(missions, held_pose) -> None:
     fake = build_fake(missions, "overhead")
     for label, y in (("cube", 0.1), ("sphere", -0.1)):
         fake.world.put(label, 0.5, y)
@@ -69,7 +69,7 @@ def test_an_unknown_yaw_blocks_the_transit_but_not_that_of_a_round_object(missio
     assert make_bin_goal(fake.cell, "red_bin", targets["sphere"].item, None).yaws == ()
     assert make_bin_goal(fake.cell, "blue_bin", targets["cube"].item, None).yaws == ()
     item = pick(fake, targets["cube"])
-    fake.ledger.record_grasp(item, held_yaw)
+    fake.ledger.record_grasp(item, held_pose)
     result = run_skill(Transit(held=item, bin="red_bin"), fake)
     assert result.reason == "blocked"
     assert result.message.startswith("red_bin needs cube-1 at 30 degrees, but no image showed the yaw")
@@ -80,7 +80,17 @@ def test_fingers_without_space_at_the_yaw_of_a_slot_are_blocked(missions: Path) 
     fake.world.put("cube", 0.5, 0.0)
     (target,) = look(fake)
     with pytest.raises(Blocked, match="yaw that red_bin needs: the wall of red_bin is in the way"):
-        make_bin_goal(fake.cell, "red_bin", target.item, Yaw(0.0, 0.1, 4))
+        make_bin_goal(fake.cell, "red_bin", target.item, HeldPose(Yaw(0.0, 0.1, 4)))
+
+
+def test_the_middle_of_an_object_that_is_held_beside_it_comes_over_the_middle_of_the_slot(missions) -> None:
+    fake = build_fake(missions, "overhead", slots=(1, 1), place_yaw_deg=90.0)
+    fake.world.put("duck", 0.5, 0.0)
+    (target,) = look(fake)
+    held = HeldPose(Yaw(0.0, 0.1, 2), (0.02, 0.01))
+    goal = make_bin_goal(fake.cell, "red_bin", target.item, held)
+    tool = make_tool_down_pose(goal.position, goal.yaws[0])
+    assert tool.apply([0.02, 0.01, 0.0])[:2] == pytest.approx(fake.cell.bins["red_bin"].slots[0])
 
 
 def test_a_layer_of_a_pallet_is_as_thick_as_its_class(missions: Path) -> None:

@@ -45,6 +45,10 @@ def test_a_mesh_is_found_beside_the_cell_file_wherever_the_command_is_given() ->
         ("mesh: parts/washer.obj, ", "", "objects.washer needs either a urdf or a mesh\n"),
         ("mesh:", "urdf: cube_small.urdf, mesh:", "objects.washer needs either a urdf or a mesh, not both\n"),
         ("ring: 0.017", "ring: 0.03", "objects.washer has a ring of 0.03 m, which must be smaller than the radius, 0.025 m\n"),
+        ("ring: 0.017", "grasp: {point: [0, 0.03, 0.004]}", "a grasp point at 0, 0.03, 0.004 m, outside of the object"),
+        ("ring: 0.017", "ring: 0.017, grasp: {point: [0, 0, 0.004]}", "has a ring or grasp points, not both"),
+        ("ring: 0.017", "grasp: {point: [0, 0.01, 0.004]}, footprint: [0.05, 0.05], yaw_symmetry: 0", "and no yaw_symmetry of 0"),
+        ("mesh: parts/washer.obj", "urdf: cube_small.urdf, variants: [parts/washer.obj]", "has variants, so it needs a mesh"),
     ],
 )  # fmt: skip
 def test_findings_say_what_an_object_needs(old: str, new: str, expected: str) -> None:

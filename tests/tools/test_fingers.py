@@ -14,7 +14,7 @@ from at_terminal import invoke
 
 from executive.cell.config import CellConfig
 from executive.cell.device_config import STEP, MotionConfig
-from executive.cell.objects import ObjectClass, Target
+from executive.cell.objects import GraspPoint, ObjectClass, Target
 from executive.cell.tools import GraspAttempt, ToolMeasurement
 from executive.drivers.sim.fingers import SimFingers
 from executive.drivers.sim.world import World
@@ -72,6 +72,17 @@ def test_fingers_close_on_opposite_sides_the_narrowest_first(object_class, yaw_c
     assert {grasp.guard for grasp in grasps} == {"clear"}
     across = [yaw % math.pi for grasp in grasps[:1] for yaw in grasp.goal.yaws]
     assert any(yaw == pytest.approx(0.3) for yaw in across) or not across
+
+
+def test_fingers_close_at_a_grasp_point_in_its_direction() -> None:
+    points = (GraspPoint((0.04, 0.0, 0.03), width=0.02), GraspPoint((0.0, 0.0, 0.03), 0.05, direction=0.0))
+    part = replace(BAR, height=0.05, yaw_symmetry=1, contact_radius=0.04, grasp_points=points)
+    end, middle = list_grasps(part, Yaw(math.pi / 2, 1e-9, 1))
+    assert end.goal.position == pytest.approx((0.5, 0.14, 0.03))
+    assert middle.goal.position == pytest.approx((0.5, 0.1, 0.03))
+    assert (end.opening, middle.opening) == pytest.approx((0.032, 0.062))
+    assert np.sin(end.goal.yaws) == pytest.approx([1, -1])
+    assert np.cos(middle.goal.yaws) == pytest.approx([1, -1])
 
 
 def test_an_uncertain_yaw_a_failed_attempt_and_an_unknown_yaw_open_the_fingers_wider() -> None:

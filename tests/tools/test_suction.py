@@ -9,9 +9,10 @@ import pytest
 from pybullet_utils.bullet_client import BulletClient
 
 from executive.cell.device_config import MotionConfig
-from executive.cell.objects import ObjectClass, Target
+from executive.cell.objects import GraspPoint, ObjectClass, Target
 from executive.cell.tools import GraspAttempt, ToolMeasurement
-from executive.geometry import make_tool_down_pose
+from executive.errors import Blocked
+from executive.geometry import Yaw, make_tool_down_pose
 from executive.tools.suction import CupContact, Suction, compute_breakaway_force, measure_contact
 
 REACH = 0.002
@@ -110,6 +111,39 @@ def test_a_touch_far_below_the_top_is_a_miss():
     centre = np.array([0.5, 0.0, CLASSES["sphere"].height / 2])
     touches = [TOOL.measure_contact(CLASSES["sphere"], centre, height, CLASSES) for height in (0.04, 0.05)]
     assert [touch.is_miss for touch in touches] == [True, False]
+
+
+SCISSORS = ObjectClass(
+    "scissors", 0.02, 0.06, footprint=(0.12, 0.06), yaw_symmetry=1, contact_radius=0.03,
+    grasp_points=(GraspPoint((0.03, 0.0, 0.01)), GraspPoint((-0.02, 0.01, 0.02))),
+)  # fmt: skip
+
+
+def list_places(yaw: Yaw | None, count: int) -> list[tuple[float, ...]]:
+    """Return the contact points of successive attempts [mm] at scissors in the origin."""
+    target = Target("scissors-1", "scissors", np.array([0, 0, 0.01]), 0.9, 1, 0, 0.0, yaw)
+    places = []
+    for number in range(count):
+        (grasp,) = TOOL.list_grasps(SCISSORS, target, MotionConfig(), GraspAttempt(number))
+        x, y, _ = grasp.goal.position
+        places.append((round(1000 * x), round(1000 * y), round(1000 * grasp.contact_height)))
+    return places
+
+
+def test_attempts_go_from_point_to_point_and_to_both_ends_if_they_look_alike() -> None:
+    quarter = math.pi / 2
+    assert list_places(Yaw(quarter, 0.01, 1), 2) == [(0, 30, 10), (-10, -20, 20)]
+    assert list_places(Yaw(quarter, 0.01, 2), 4)[2:] == [(0, -30, 10), (10, 20, 20)]
+    x, y, _ = list_places(Yaw(quarter, 0.01, 1), 3)[2]
+    assert math.dist((x, y), (0, 30)) == pytest.approx(2.5, abs=1), "the next round is beside the points"
+    with pytest.raises(Blocked, match="scissors-1 can be held only at a known yaw"):
+        list_places(None, 1)
+
+
+@pytest.mark.parametrize(("height", "contradiction"), [(0.01, False), (0.02, False), (0.015, True)])
+def test_a_touch_has_to_be_at_the_height_of_a_grasp_point(height: float, contradiction: bool) -> None:
+    measurement = TOOL.measure_contact(SCISSORS, np.array([0, 0, 0.01]), height, {"scissors": SCISSORS})
+    assert bool(measurement.contradiction) is contradiction
 
 
 def test_an_approach_never_feels_below_the_middle_of_what_it_is_to_touch() -> None:

@@ -26,9 +26,11 @@ from executive.drivers.sim.models import (
     SETTLING_STEP_COUNT,
     add_body,
     build_drop_world,
+    has_texture,
     load_mesh,
     load_unknown_model,
     locate_object,
+    name_unknown_model,
     scale_model,
 )
 from executive.drivers.sim.world import PLAIN_TEXTURE, TEXTURES, WOOD_TEXTURE, World
@@ -114,6 +116,12 @@ def draw_object_colour(palette: Sequence[Colour], table_colour: Colour, rng: np.
     return float(red), float(green), float(blue)
 
 
+def draw_tint(rng: np.random.Generator) -> Colour:
+    """Return a random factor of the colours of a texture, which keeps them recognizable."""
+    red, green, blue = rng.uniform(0.65, 1.0) * rng.uniform(0.85, 1.0, 3)
+    return red, green, blue
+
+
 def draw_hsv_colour(rng: np.random.Generator, saturations: Range, values: Range) -> Colour:
     """Return a colour with random hue, and with saturation and value in the given ranges, each 0 to 1."""
     return colorsys.hsv_to_rgb(rng.random(), rng.uniform(*saturations), rng.uniform(*values))
@@ -170,6 +178,8 @@ SCALE_FACTORS = (0.75, 0.8, 0.85, 0.9, 0.95, 1.05, 1.1, 1.15, 1.2, 1.3)
 """Scale factors of objects whose size differs from the size of their class."""
 TRAINING_MODEL_NUMBERS = tuple(number for number in range(800) if number != DAMAGED_MODEL_NUMBER)
 """Indices of the shapes for unknown objects in training; all other shapes are reserved for tests."""
+OWN_UNKNOWN_FRACTION = 0.8
+"""Fraction of the unknown objects that have meshes of the cell, if it has any."""
 TABLE_X_RANGE = (-0.05, 0.86)
 """Range of the x coordinates of objects on the table top [m]."""
 TABLE_Y_RANGE = (-0.71, 0.71)
@@ -228,12 +238,17 @@ def draw_objects(config: CellConfig, count: int, table_colour: Colour, rng: Gene
     scaled_fraction = rng.uniform(0.2, 1.0) if rng.random() < 0.35 else 0.0
     objects = []
     for label in map(str, rng.choice(list(config.objects), count)):
-        model = config.objects[label]
-        colour = draw_object_colour(model.colours, table_colour, rng)
+        model = config.objects[label].draw_model(rng)
+        colour = (
+            draw_tint(rng) if has_texture(model) else draw_object_colour(model.colours, table_colour, rng)
+        )
         if rng.random() < unknown_fraction:
             label = UNKNOWN_LABEL
-            model = load_unknown_model(int(rng.choice(TRAINING_MODEL_NUMBERS)))
-            model = scale_model(model, rng.uniform(0.4, 1.0))
+            if config.unknown.meshes and rng.random() < OWN_UNKNOWN_FRACTION:
+                model = load_unknown_model(str(rng.choice(config.unknown.meshes)))
+            else:
+                model = load_unknown_model(name_unknown_model(int(rng.choice(TRAINING_MODEL_NUMBERS))))
+                model = scale_model(model, rng.uniform(0.4, 1.0))
         elif rng.random() < scaled_fraction:
             model = scale_model(model, float(rng.choice(SCALE_FACTORS)))
         objects.append(TrueObject(label, Pose.identity(), model=model, colour=colour))

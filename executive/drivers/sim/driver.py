@@ -19,7 +19,7 @@ from executive.cell.objects import BIN_THICKNESS
 from executive.drivers import world_log
 from executive.drivers.sim.arm import SimArm
 from executive.drivers.sim.camera import SimCamera, find_missing_depth_sensors
-from executive.drivers.sim.models import compute_mass, find_model_errors
+from executive.drivers.sim.models import compute_mass, find_model_errors, measure_hold
 from executive.drivers.sim.spawn import build_world_of_run, find_object_count_errors
 from executive.drivers.sim.tool import SimTool
 from executive.drivers.sim.world import SimVisuals, World
@@ -55,6 +55,7 @@ class SimDriver:
     """
 
     compute_mass = staticmethod(compute_mass)
+    measure_hold = staticmethod(measure_hold)
     driver_options: ClassVar[Mapping[str, str]] = {"scene": "file", "gui": "flag"}
 
     def __init__(

@@ -22,8 +22,10 @@ from executive.arms.urdf import find_model, make_rotation, parse_numbers
 from executive.cell.config import CellConfig, ObjectConfig
 from executive.cell.device_config import STEP
 from executive.cell.frame import Box
+from executive.cell.tools import CONTACT_SPACING
 from executive.errors import InputError
-from executive.geometry import Array, Pose
+from executive.geometry import Array, Pose, make_tool_down_pose
+from executive.perception.yaw import choose_skewness
 from executive.physics import model_files
 from executive.processes import build_command
 from executive.text.validate import KeyPath
@@ -38,6 +40,9 @@ MAX_ORIGIN_OFFSET = 0.5
 """Maximum horizontal distance between centre and origin of a URDF, relative to the radius."""
 SIZE_TOLERANCE = 0.003
 """Maximum difference between a size in a cell file and the size of the model [m]."""
+MESH_MARGIN = 1e-4
+"""Distance by which the collision shape of a mesh exceeds the mesh [m]. With the default of PyBullet, 1 mm,
+the top of a mesh on a table is felt 2 mm too high."""
 ROLLING_FRICTION = 0.0005
 """Coefficient of rolling and spinning friction; without it, balls would never come to rest."""
 TRIAL_TIMEOUT = 30
@@ -75,6 +80,25 @@ class Mesh:
     def top(self) -> float:
         """Z coordinate of the highest vertex [m]."""
         return float(self.vertices[:, 2].max())
+
+    def measure_top(self, x: float, y: float) -> float:
+        """Return the height of the surface at a point above the lowest vertex [m]; -inf beside the mesh.
+
+        `x` and `y` are relative to the centre of the bounding box [m].
+        """
+        centre = (self.vertices.min(axis=0) + self.vertices.max(axis=0)) / 2
+        corners = self.vertices[self.triangles] - [centre[0] + x, centre[1] + y, self.bottom]
+        a, b, c = np.swapaxes(corners, 0, 1)
+
+        def cross(p: Array, q: Array) -> Array:
+            return np.asarray(p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0])
+
+        # Weights of the corners of the point (0, 0), which is in a triangle if no two have different signs.
+        weights = np.stack([cross(b, c), cross(c, a), cross(a, b)])
+        sums = weights.sum(axis=0)
+        is_inside = (weights * np.sign(sums) >= 0).all(axis=0) & (np.abs(sums) > 1e-12)
+        heights = np.einsum("ij,ji->j", weights, corners[..., 2]) / np.where(sums == 0, 1.0, sums)
+        return float(np.max(heights, where=is_inside, initial=-math.inf))
 
     @property
     def radius(self) -> float:
@@ -117,13 +141,14 @@ def add_body(client: BulletClient, config: ObjectConfig, X_WO: Pose) -> int:
     X_WL = X_WO @ compute_upright_pose(config)
     path = model_files.convert_model(find_model(config.mesh or config.urdf))
     if config.mesh:
-        # PyBullet replaces each group (`g`) of a Wavefront file by its convex hull, enlarged by 1 mm.
+        # PyBullet replaces each group (`g`) of a Wavefront file by its convex hull.
         shape = {"fileName": path, "meshScale": [config.scale] * 3}
         centroid = compute_upright_pose(config).inverse().apply(load_mesh(config).centroid)
         collision = client.createCollisionShape(pybullet.GEOM_MESH, **shape)
         visual = client.createVisualShape(pybullet.GEOM_MESH, **shape)
         mass = compute_mass(config)
         body = client.createMultiBody(mass, collision, visual, X_WL.position, X_WL.quaternion, centroid)
+        client.changeDynamics(body, -1, collisionMargin=MESH_MARGIN)
     else:
         try:
             body = client.loadURDF(path, X_WL.position, X_WL.quaternion, globalScaling=config.scale)
@@ -159,21 +184,45 @@ def compute_mass(config: ObjectConfig) -> float:
     return mass
 
 
+def measure_hold(config: CellConfig, label: str) -> float:
+    """Return the largest force with which the tool can hold the model of a class [N].
+
+    The tool is at the places of the first attempts: at a grasp point, on the ring or near the middle.
+    """
+    section = config.objects[label]
+    mesh = load_mesh(section)
+    X_WO = Pose.of([0.0, 0.0, -mesh.bottom])
+    middle_x, middle_y = ((mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0))[:2] / 2).tolist()
+    offsets = [(x, y) for x in (0.0, -CONTACT_SPACING, CONTACT_SPACING) for y in (0.0, CONTACT_SPACING)]
+    places = [grasp.point[:2] for grasp in section.grasps] or [(section.ring + x, y) for x, y in offsets]
+    client = build_drop_world()
+    body = add_body(client, section, X_WO)
+    client.performCollisionDetection()  # Rays do not hit a new body.
+    forces = [0.0]
+    for x, y in places:
+        if math.isfinite(top := mesh.measure_top(x, y)):
+            X_WT = make_tool_down_pose((middle_x + x, middle_y + y, top))
+            forces.append(config.tool.measure_hold(client, X_WT, body))
+    return max(forces)
+
+
 def find_model_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     """Yield key and message for each model of an object that is missing, invalid, or of a wrong size.
 
     A child process tries each model that is not shipped with the executive or PyBullet; this process reads
     the model afterwards, because reading may take very long.
     """
-    for label, object_config in config.objects.items():
-        try:
-            path = find_model(object_config.mesh or object_config.urdf)
-            if not model_files.is_shipped(path):
-                _try_in_child_process(object_config, path, path.stat().st_mtime_ns)
-            compute_mass(object_config)
-            yield from _find_wrong_sizes(label, object_config)
-        except InputError as error:
-            yield ("objects", label, "mesh" if object_config.mesh else "urdf"), str(error)
+    for label, section in config.objects.items():
+        for index, object_config in enumerate(section.list_models()):
+            try:
+                path = find_model(object_config.mesh or object_config.urdf)
+                if not model_files.is_shipped(path):
+                    _try_in_child_process(object_config, path, path.stat().st_mtime_ns)
+                compute_mass(object_config)
+                yield from _find_wrong_sizes(label, object_config)
+            except InputError as error:
+                key = ("mesh" if section.mesh else "urdf",) if index == 0 else ("variants", index - 1)
+                yield ("objects", label, *key), str(error)
 
 
 def _find_wrong_sizes(label: str, config: ObjectConfig) -> Iterator[tuple[KeyPath, str]]:
@@ -187,6 +236,20 @@ def _find_wrong_sizes(label: str, config: ObjectConfig) -> Iterator[tuple[KeyPat
         if not abs(declared_size - model_size) <= SIZE_TOLERANCE:  # also True for NaN
             message = f"the model of {label} has a {name} of {model_size:.4f} m, not {declared_size:g} m; "
             yield ("objects", label, name), message + f"correct {name}, scale or upright_deg"
+    for x, y, z in (grasp.point for grasp in config.grasps):
+        if z > (top := mesh.measure_top(x, y)) + SIZE_TOLERANCE:
+            surface = f"the surface is {top * 1000:.1f} mm high" if top >= 0 else "there is no surface"
+            message = f"the grasp point {x:g}, {y:g}, {z:g} m is outside of the {label}: {surface} there"
+            yield ("objects", label, "grasp"), message
+    if config.yaw_symmetry == 1:
+        outlines, _ = cv2.findContours(
+            _draw_silhouette(mesh, mesh.vertices[:, :2] * 1000), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE
+        )
+        outline = max(outlines, key=cv2.contourArea)[:, 0]
+        vertices = outline @ [1, 1j] * np.exp(-1j * math.radians(config.yaw_offset_deg or 0.0))
+        if not choose_skewness(vertices):
+            message = f"no outline shows a half turn of the model of {label}; write yaw_symmetry: 2"
+            yield ("objects", label, "yaw_symmetry"), message
     if config.footprint is None:
         return
     corners = cv2.convexHull(mesh.vertices[:, :2].astype(np.float32))[:, 0] @ [1, 1j]
@@ -308,6 +371,13 @@ def load_mesh(config: ObjectConfig) -> Mesh:
     return _place_mesh(config, compute_upright_pose(config))
 
 
+@lru_cache(maxsize=64)
+def has_texture(config: ObjectConfig) -> bool:
+    """Return True if the material of a mesh names a texture, whose colours an object has."""
+    files = model_files.list_model_files(find_model(config.mesh)) if config.mesh else []
+    return any(file.suffix.lower() not in (".obj", ".mtl", ".stl", ".dae") for file in files)
+
+
 def _place_mesh(config: ObjectConfig, X_OL: Pose, tag: str = "visual") -> Mesh:
     """Return the scaled `visual` or `collision` mesh of an object class whose model frame L is at `X_OL`."""
     path = find_model(config.mesh or config.urdf)
@@ -323,12 +393,17 @@ def scale_model(model: ObjectConfig, factor: float) -> ObjectConfig:
     return model.model_copy(update={**sizes, "footprint": footprint})
 
 
+def name_unknown_model(number: int) -> str:
+    """Return the path of shape `number` (0 to 999) in pybullet_data; most shapes are 12 cm long."""
+    return f"random_urdfs/{number:03d}/{number:03d}.urdf"
+
+
 @cache
-def load_unknown_model(number: int) -> ObjectConfig:
-    """Return shape `number` (0 to 999) of `random_urdfs` in pybullet_data; most shapes are 12 cm long."""
-    name = f"random_urdfs/{number:03d}/{number:03d}.urdf"
-    mesh = load_mesh(ObjectConfig(urdf=name, height=1.0, radius=1.0))
-    return ObjectConfig(urdf=name, height=mesh.top - mesh.bottom, radius=mesh.radius)
+def load_unknown_model(path: str) -> ObjectConfig:
+    """Return the model of an object of no class, a URDF or a mesh."""
+    key = "urdf" if path.endswith(".urdf") else "mesh"
+    mesh = load_mesh(ObjectConfig.model_validate({key: path, "height": 1.0, "radius": 1.0}))
+    return ObjectConfig.model_validate({key: path, "height": mesh.top - mesh.bottom, "radius": mesh.radius})
 
 
 SUBPIXEL_COUNT = 4
@@ -346,6 +421,11 @@ def compute_silhouette_area(mesh: Mesh, pixels: Array) -> float:
     """Return the area [pixel²] of the silhouette of a mesh whose projected vertices are `pixels` `(N, 2)`."""
     if mesh.is_convex:
         return float(cv2.contourArea(cv2.convexHull(pixels.astype(np.float32))))
+    return float(_draw_silhouette(mesh, pixels).sum()) / SUBPIXEL_COUNT**2
+
+
+def _draw_silhouette(mesh: Mesh, pixels: Array) -> NDArray[np.uint8]:
+    """Return the silhouette of a mesh with projected vertices `(N, 2)` as a mask of subpixels, 0 or 1."""
     corner = np.floor(pixels.min(axis=0))
     size = np.ceil((pixels.max(axis=0) - corner + 1) * SUBPIXEL_COUNT).astype(int)
     mask = np.zeros((size[1], size[0]), np.uint8)
@@ -355,7 +435,7 @@ def compute_silhouette_area(mesh: Mesh, pixels: Array) -> float:
     # The triangles on the side of the camera, whose corners are clockwise, cover the whole silhouette.
     for triangle in triangles[ax * by - ay * bx > 0].round().astype(np.int32):
         cv2.fillConvexPoly(mask, triangle, 1)
-    return float(mask.sum()) / SUBPIXEL_COUNT**2
+    return mask
 
 
 if __name__ == "__main__":

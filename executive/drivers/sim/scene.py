@@ -111,6 +111,8 @@ class UnknownConfig(Section):
     models: ModelRange = (800, 999)
     """First and last number of the shapes in `random_urdfs` of pybullet_data, 0 to 999; the shipped detector
     was trained with 0 to 799."""
+    meshes: tuple[str, ...] = ()
+    """Absolute paths of meshes that replace these shapes."""
     scale: float = Field(0.6, ge=0.1, le=2)
     """Factor on the size of the shapes; most shapes are 0.12 m long at factor 1."""
     colours: Palette = ((1.0, 1.0, 1.0),)

@@ -15,6 +15,7 @@ from executive.drivers.sim.models import (
     DROP_HEIGHT,
     load_mesh,
     load_unknown_model,
+    name_unknown_model,
     scale_model,
 )
 from executive.drivers.sim.scene import DECLARED_SCENE, SceneConfig, UnknownConfig, build_world, load_scene
@@ -71,7 +72,7 @@ def spawn_objects(world: World, seed: int, unknown: UnknownConfig | None = None)
     rng = np.random.default_rng(seed)
     count = int(rng.integers(*config.table.objects, endpoint=True))
     labels = [str(label) for label in rng.choice(list(config.objects), count)]
-    models = [(label, config.objects[label]) for label in labels]
+    models = [(label, config.objects[label].draw_model(rng)) for label in labels]
     if unknown is not None:
         models += [(UNKNOWN_LABEL, model) for model in _draw_unknown_models(unknown, rng)]
     positions = draw_positions(config, [model.radius for _, model in models], rng)
@@ -89,10 +90,14 @@ def spawn_objects(world: World, seed: int, unknown: UnknownConfig | None = None)
 
 def _draw_unknown_models(unknown: UnknownConfig, rng: np.random.Generator) -> Iterator[ObjectConfig]:
     first_number, last_number = unknown.models
-    numbers = [number for number in range(first_number, last_number + 1) if number != DAMAGED_MODEL_NUMBER]
+    shapes = unknown.meshes or [
+        name_unknown_model(number)
+        for number in range(first_number, last_number + 1)
+        if number != DAMAGED_MODEL_NUMBER
+    ]
     count = int(rng.integers(*unknown.count, endpoint=True))
-    for number in rng.choice(numbers, count):
-        model = scale_model(load_unknown_model(int(number)), unknown.scale)
+    for index in rng.choice(len(shapes), count):
+        model = scale_model(load_unknown_model(shapes[index]), unknown.scale)
         yield model.model_copy(update={"colours": unknown.colours})
 
 

@@ -22,6 +22,9 @@ PULL_SMOOTHING = 0.25
 """Weight of the newest step in the low-pass filter of the pull on the grip. The time constant of 14 ms (3.5
 steps) suppresses impact forces of the solver, which last a single step, and is short enough for a grip."""
 
+YIELD_RATE = 0.1
+"""Fraction of the remaining compression by which the end of a tool yields in a physics step; with larger
+values, the force on a body between tool and table oscillates."""
 MIN_SUPPORT_COSINE = 0.7
 """Minimum cosine between the vertical and the direction of a contact force that supports a body."""
 
@@ -35,19 +38,24 @@ class _Grip:
         constraint: Constraint between tool and body.
         force: Pull at which the tool loses the body [N].
         pull: Filtered pull on the body `(3,)` [N].
+        axis: Tool axis in the inertial frame of the body, towards the body `(3,)`.
+        compression: Distance by which the end of the tool is compressed [m].
     """
 
     body: int
     constraint: int
     force: float
+    axis: Array
     pull: Array = field(default_factory=lambda: np.zeros(3))
+    compression: float = 0.0
 
 
 class SimTool:
     """A tool of a `World`; implements `Tool`. Call `advance` after each physics step.
 
     A held body keeps its pose relative to the tool until the filtered pull on it exceeds the force of the
-    grip; moments have no effect. The body is still within reach immediately after its loss. The tool
+    grip; moments have no effect. A body that is pressed against the end of the tool compresses it like a
+    spring, and does not leave it. A lost body is still within reach immediately after its loss. The tool
     therefore grips it again only after the body has left the reach or the tool has been open.
 
     Args:
@@ -55,6 +63,8 @@ class SimTool:
         model: Section of the tool in the cell file.
         find_grip: Finds the body that the tool can grip.
         reach: Maximum distance between the tip and a body that the tool grips [m].
+        stroke: Maximum compression of the end of the tool [m].
+        stiffness: Force that compresses the end of the tool [N/m].
         noise_seed: Random seed of the noise of `load`.
 
     Attributes:
@@ -66,12 +76,15 @@ class SimTool:
     """
 
     def __init__(
-        self, world: World, model: ToolModel, find_grip: FindGrip, reach: float, noise_seed: int = 0
-    ) -> None:
+        self, world: World, model: ToolModel, find_grip: FindGrip, reach: float, noise_seed: int = 0,
+        stroke: float = 0.0, stiffness: float = math.inf,
+    ) -> None:  # fmt: skip
         self._world = world
         self._model = model
         self._find_grip = find_grip
         self._reach = reach
+        self._stroke = stroke
+        self._stiffness = stiffness
         self.load_std = model.load_std
         self._noise_seed = noise_seed
         self.holding = False
@@ -140,6 +153,7 @@ class SimTool:
         """Update the grip after a physics step."""
         if (grip := self._grip) is not None:
             force = np.array(self._world.client.getConstraintState(grip.constraint)[:3])
+            force = self._compress(grip, force)
             # While the body lies on a support, the rigid constraint shows the tracking error of the arm,
             # which the compliance of a real tool absorbs.
             contacts = self._world.client.getContactPoints(bodyA=grip.body) or ()
@@ -151,6 +165,21 @@ class SimTool:
         elif not self.is_idle:
             self._try_to_grip()
 
+    def _compress(self, grip: _Grip, force: Array) -> Array:
+        """Let the end of the tool yield to a force `(3,)` [N]; return its part that does not compress it."""
+        axis = self._get_rotation(grip.body) @ grip.axis
+        pressure = max(-float(force @ axis), 0.0)
+        target = min(pressure / self._stiffness, self._stroke)
+        if grip.compression or target:
+            grip.compression += YIELD_RATE * (target - grip.compression)
+            pivot = (grip.compression * grip.axis).tolist()
+            self._world.client.changeConstraint(grip.constraint, jointChildPivot=pivot)
+        return np.asarray(force + pressure * axis)
+
+    def _get_rotation(self, body: int) -> Array:
+        """Return the rotation of the inertial frame of a body `(3, 3)`."""
+        return Pose.of(*self._world.client.getBasePositionAndOrientation(body)).rotation
+
     def _try_to_grip(self) -> None:
         near_bodies = set(self._find_bodies_near(self._reach))
         if self._separating_body not in near_bodies:
@@ -160,7 +189,8 @@ class SimTool:
         if found is not None:
             body, force = found
             self.dropped_bodies.discard(body)
-            self._grip = _Grip(body, self._attach(body), force)
+            axis = self._get_rotation(body).T @ self._world.get_tool_pose().rotation[:, 2]
+            self._grip = _Grip(body, self._attach(body), force, axis)
             self.held_body = body
             self.holding = True
             # Tip and body overlap slightly, and their contact forces would act against the constraint.

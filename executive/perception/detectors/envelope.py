@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -238,7 +239,11 @@ def compute_fingerprint(config: CellConfig, detector: str, base: Path) -> Mappin
     relative to `base`.
     """
     section = config.detectors[detector]
-    options = {key: value for key, value in section.options.items() if key != "threads"}
+    options = {
+        key: Path(value).name if isinstance(value, str) and os.path.isfile(base / value) else value
+        for key, value in section.options.items()
+        if key != "threads"
+    }
     find_weights = getattr(find_detector_kinds()[section.kind].load(), "weights", None)
     weights = find_weights(section, base) if find_weights else None
     camera = next(iter(config.cameras.values()))

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from executive.cell.config import CellConfig, ObjectConfig
-from executive.drivers.sim.models import find_model_errors, load_mesh
+from executive.cell.config import CellConfig, GraspConfig, ObjectConfig
+from executive.drivers.sim.models import find_model_errors, load_mesh, measure_hold
 from executive.drivers.sim.world import World
 from executive.errors import InputError
 from executive.geometry import Pose, rotate_about_z
@@ -83,6 +83,54 @@ def test_what_is_no_mesh_is_refused_with_the_reason(text: str, complaint: str, t
     path.write_text(text)
     with pytest.raises(InputError, match=rf"the model thing\.obj is no Wavefront mesh: {complaint}"):
         read_mesh(path)
+
+
+def test_every_variant_is_drawn_and_checked(wedge: ObjectConfig) -> None:
+    part = wedge.model_copy(update={"variants": ("gone.obj", wedge.mesh)})
+    meshes = [part.draw_model(np.random.default_rng(seed)).mesh for seed in range(40)]
+    assert min(meshes.count(wedge.mesh) / 2, meshes.count("gone.obj")) > 5
+    config = CellConfig.model_construct(objects={"part": part})
+    assert [key for key, _ in find_model_errors(config)] == [("objects", "part", "variants", 0)]
+
+
+@pytest.mark.parametrize(
+    ("point", "text"),
+    [
+        ((-0.0095, 0.0, 0.028), ""),
+        ((0.0, 0.0, 0.015), ""),
+        ((0.0, 0.0, 0.02), "the surface is 15.0 mm high there"),
+        ((0.0, 0.008, 0.01), "there is no surface there"),
+    ],
+)
+def test_a_grasp_point_outside_of_the_mesh_is_found(wedge: ObjectConfig, point, text: str) -> None:
+    part = wedge.model_copy(update={"grasp": (GraspConfig(point=point),), "footprint": (0.02, 0.01)})
+    messages = [message for _, message in find_model_errors(CellConfig.model_construct(objects={"w": part}))]
+    assert bool(messages) is bool(text)
+    assert all(text in message for message in messages)
+
+
+def test_a_model_that_looks_the_same_after_a_half_turn_has_no_yaw_symmetry_of_1(
+    overhead: CellConfig, wedge: ObjectConfig
+) -> None:
+    footprint = {"footprint": (0.02, 0.01), "yaw_symmetry": 1}
+    config = with_objects(overhead, wedge=wedge.model_copy(update=footprint))
+    ((key, message),) = find_model_errors(config)
+    assert (key, "half turn" in message) == (("objects", "wedge", "yaw_symmetry"), True)
+    assert not [
+        *find_model_errors(with_objects(overhead, wedge=wedge.model_copy(update={"footprint": (0.02, 0.01)})))
+    ]
+
+
+def test_a_cup_holds_no_edge_and_no_surface_that_is_smaller_than_itself(
+    overhead: CellConfig, wedge: ObjectConfig
+) -> None:
+    perfect = overhead.tool.max_holding_force
+    assert measure_hold(overhead, "cube") == pytest.approx(perfect)
+    assert 0.0 < measure_hold(overhead, "duck") < perfect
+    cube = overhead.objects["cube"]
+    edge = cube.model_copy(update={"grasp": GraspConfig(point=(0.022, 0.0, 0.05))})
+    config = with_objects(overhead, small=wedge, edge=edge)
+    assert [measure_hold(config, label) for label in ("small", "edge")] == [0.0, 0.0]
 
 
 def test_the_declared_friction_is_that_of_the_body(

@@ -9,6 +9,7 @@ import pytest
 from executive.drivers.sim.world import World
 from executive.geometry import GRAVITY, Array, Pose
 from executive.motion.joints import build_kinematics
+from executive.physics.cell_world import NORMAL_FORCE
 from tests.motion.joint_states import CONFIG, reach
 
 X, Y = 0.5, 0.05
@@ -133,6 +134,25 @@ def test_the_pull_of_an_object_on_its_support_does_not_break_the_seal(bench: Ben
     bench.tool.close()
     bench.steps(60, pull=1.5 * bench.config.force)
     assert bench.tool.holding and bench.tool.pull == 0
+
+
+@pytest.mark.parametrize("bench", ["cube", "duck"], indirect=True)
+def test_the_bellows_yields_to_pressure_and_springs_back(bench: Bench) -> None:
+    bench.put(0.0005)
+    before = bench.pose_in_tool().position
+    bench.tool.close()
+    bench.raise_by(-0.0015)
+    forces = []
+    for _ in range(60):
+        bench.steps(1)
+        contacts = bench.world.client.getContactPoints(bodyA=bench.body)
+        forces.append(sum(point[NORMAL_FORCE] for point in contacts))
+    assert np.mean(forces) == pytest.approx(bench.config.force * 1.5 / 2.5 + 0.98, rel=0.3)
+    assert max(forces) < 1.5 * bench.config.force
+    bench.raise_by(0.1)
+    bench.steps(60)
+    assert bench.tool.holding
+    assert bench.pose_in_tool().position == pytest.approx(before, abs=5e-4)
 
 
 def test_opening_drops_the_object_and_lets_it_collide_with_the_tool_again(bench: Bench) -> None:
