@@ -28,12 +28,14 @@ if TYPE_CHECKING:
 
 TEMPLATE = Path(__file__).parent / "template"
 """Folder with the template of every file of a project."""
+MISSION_TEMPLATE = TEMPLATE.with_name("template_from")
+"""Folder with the template of every file of a project with a shipped mission."""
 SUFFIX = ".jinja"
 """Suffix of every template file, so that tools do not treat the templates as code of this project."""
 PACKAGE = "package"
 """Name of the folder in `TEMPLATE` that is renamed to the name of the package."""
-MISSION_FILE = "sort.yaml"
-"""Name of the mission file of a project."""
+MISSION = "mission.yaml"
+"""Name of the file in `MISSION_TEMPLATE` that is renamed to the name of the mission."""
 FOLDERS = ("cells", "runs", "tests")
 """Folders beside the package in a project; a package must not have one of these names."""
 
@@ -154,15 +156,17 @@ LAYOUTS: tuple[Mapping[str, Any], ...] = (
 
 
 def write_project(
-    folder: Path, package: str, layout: Mapping[str, Any] = LAYOUTS[0], arm: Mapping[str, str] | None = None
-) -> list[str]:
+    folder: Path, package: str, layout: Mapping[str, Any] = LAYOUTS[0], arm: Mapping[str, str] | None = None,
+    source: Path = TEMPLATE,
+) -> list[str]:  # fmt: skip
     """Create a project in an empty or new folder; return the file paths, relative to the folder.
 
     Args:
         folder: The folder.
         package: Name of the Python package.
-        layout: Workspace and bins of the cell.
+        layout: Workspace and bins of the cell, or other values of the templates.
         arm: Name and sections of the arm in the cell file; None: the arm of the base.
+        source: Folder of the templates.
 
     Raises:
         InputError: The folder is not empty, is a file, or cannot be written.
@@ -179,10 +183,11 @@ def write_project(
         raise InputError(f'the folder "{folder}" is not empty: it contains {entries[0]}{more_text}; {advice}')
     # The files are code and YAML, in which HTML escapes would be wrong.
     templates = Environment(autoescape=False, undefined=StrictUndefined, keep_trailing_newline=True)
+    new_names = {PACKAGE: package, MISSION: f"{layout.get('mission')}.yaml"}
     names = []
-    for template in sorted(TEMPLATE.rglob(f"*{SUFFIX}")):
-        parts = template.relative_to(TEMPLATE).with_suffix("").parts
-        name = PurePosixPath(*(package if part == PACKAGE else part for part in parts))
+    for template in sorted(source.rglob(f"*{SUFFIX}")):
+        parts = template.relative_to(source).with_suffix("").parts
+        name = PurePosixPath(*(new_names.get(part, part) for part in parts))
         text = templates.from_string(template.read_text(encoding="utf-8")).render(
             name=package, arm=arm, **layout
         )
@@ -192,6 +197,27 @@ def write_project(
             path.write_text(text, encoding="utf-8")
         names.append(str(name))
     return names
+
+
+def _write_project_from(folder: Path, package: str, name: str) -> list[str]:
+    """Create a project with a shipped mission, and workspace and bins of its cell; return the file paths.
+
+    Raises:
+        InputError: There is no such mission, or the project cannot be written.
+    """
+    from executive.text.files import find_cell, find_mission
+
+    text = find_mission(name).read_text(encoding="utf-8")
+    head = {key: re.search(rf"(?m)^{key}: *(.+)$", text) for key in ("mission", "description", "cell")}
+    mission, description, cell_path = (match[1] if match else "" for match in head.values())
+    cell = Path(cell_path).stem
+    lines = find_cell(cell).read_text(encoding="utf-8")
+    sections = re.findall(r"(?m)^(?:table|bins):.*\n(?:[ #].+\n)*", lines)
+    values = {
+        "mission": mission, "description": description, "cell": cell, "sections": "\n".join(sections).strip(),
+        "mission_text": text.strip().replace(f"cell: {cell_path}", "cell: cells/table.yaml"),
+    }  # fmt: skip
+    return write_project(folder, package, values, source=MISSION_TEMPLATE)
 
 
 def _write_project_with_arm(folder: Path, package: str, urdf: str, flange: str) -> list[str]:
@@ -328,17 +354,25 @@ def _find_conflict(name: str) -> str:
 @click.option("--name", help="Name of the Python package; by default derived from the name of DIR.")
 @click.option("--urdf", default="", help="URDF of the arm of the project; by default, the arm is an iiwa.")
 @click.option("--flange", default="", help="Link of the URDF at the flange; by default, one is proposed.")
-def init_command(folder: Path, name: str | None, urdf: str, flange: str) -> None:
+@click.option(
+    "--from", "mission", default="", help="Shipped mission that the project contains, to change it."
+)
+def init_command(folder: Path, name: str | None, urdf: str, flange: str, mission: str) -> None:
     """Create a project with a mission, a cell and a skill.
 
     The mission can be run at once, and the skill has tests. The folder DIR must be empty or must not exist.
     The project need not be installed: commands that are run in DIR find its skills. With --urdf, the project
-    contains a copy of the model, an arm file, and a cell with this arm.
+    contains a copy of the model, an arm file, and a cell with this arm. With --from, the project contains a
+    shipped mission, and a cell with its workspace and bins.
     """
     package = make_package_name(folder) if name is None else check_package_name(name, f'--name "{name}"')
     if flange and not urdf:
         raise InputError("--flange names a link of a URDF; name the URDF with --urdf")
-    if urdf:
+    if urdf and mission:
+        raise InputError("--urdf and --from exclude each other; omit one of them")
+    if mission:
+        files = _write_project_from(folder, package, mission)
+    elif urdf:
         with shared.keep_stdout_clean():
             files = _write_project_with_arm(folder, package, urdf, flange)
     else:
@@ -347,5 +381,6 @@ def init_command(folder: Path, name: str | None, urdf: str, flange: str) -> None
     # `uv run executive init` activates the virtual environment only for this command.
     click.echo(f"Type, after `. {shlex.quote(str(Path(sys.prefix) / 'bin' / 'activate'))}`:")
     change_folder = "" if folder.resolve() == Path.cwd() else f"cd {shlex.quote(str(folder))} && "
-    click.echo(f"  {change_folder}executive run {MISSION_FILE}")
+    mission_file = next(file for file in files if file.endswith(".yaml") and "/" not in file)
+    click.echo(f"  {change_folder}executive run {mission_file}")
     click.echo("  pytest")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import subprocess
@@ -67,6 +68,23 @@ def test_its_code_is_as_tidy_as_this_project(missions: Path) -> None:
     assert linted.returncode == 0, linted.stdout
     formatted = called("ruff", "format", "--check", "--config", str(config), ".", folder=Path("hall"))
     assert formatted.returncode == 0, formatted.stdout
+
+
+@pytest.mark.parametrize("mission", ["sort_fasteners", "sort_fruit", "tray_instruments"])
+def test_a_project_can_begin_with_a_shipped_mission(mission: str) -> None:
+    made = init("hall", "--from", mission)
+    assert made.stdout.splitlines()[0] == (
+        f"hall: .gitignore, README.md, cells/table.yaml, {mission}.yaml, tests/test_mission.py"
+    )
+    assert f"  cd hall && executive run {mission}.yaml" in made.stdout
+    (checked,) = json.loads(invoke("check", f"hall/{mission}.yaml", "--json").stdout)
+    assert checked["findings"] == []
+
+
+def test_a_project_begins_with_one_thing() -> None:
+    assert "exclude each other" in init("hall", "--from", "sort_fruit", "--urdf", "arm.urdf").stderr
+    assert 'shipped mission "sort_friut"' in init("hall", "--from", "sort_friut").stderr
+    assert not Path("hall").exists()
 
 
 @pytest.mark.slow
