@@ -197,6 +197,8 @@ class ObjectConfig(Section):
                     f"has a grasp point at {x:g}, {y:g}, {z:g} m, outside of the object: at most "
                     f"{self.radius:g} m from the middle, and up to {self.height:g} m above the underside"
                 )
+        if len({point.point[2] for point in self.grasps}) > 1:
+            raise ValueError("has grasp points at several heights; they need the same z")
         if self.ring and self.grasp:
             raise ValueError("has a ring or grasp points, not both")
         if self.needs_yaw and not (self.footprint and self._derive_yaw_properties()["yaw_symmetry"]):

@@ -172,14 +172,13 @@ class ObjectClass:
 
     @property
     def hold_height(self) -> float:
-        """Height above the underside at which a tool from above touches the object [m]."""
+        """Height above the underside of a touch from above [m], which all grasp points have."""
         return max((point.position[2] for point in self.grasp_points), default=self.height)
 
     @property
     def touch_heights(self) -> list[float]:
-        """Possible heights above the table of a touch from above [m]: of the grasp points, or of the top."""
-        heights = [point.position[2] for point in self.grasp_points] or [self.height]
-        return [height + support for height in heights for support in self.support_heights]
+        """Possible heights above the table of a touch from above [m]."""
+        return [self.hold_height + support_height for support_height in self.support_heights]
 
     @property
     def outline_area(self) -> float:

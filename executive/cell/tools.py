@@ -15,7 +15,7 @@ from pydantic_core import CoreSchema
 
 from executive.cell.arm import Goal
 from executive.cell.device_config import Length, MotionConfig, Section
-from executive.cell.objects import GraspPoint, ObjectClass, Target
+from executive.cell.objects import ObjectClass, Target
 from executive.errors import Blocked, InputError
 from executive.geometry import Array, Pose, Yaw, rotate_about_z
 from executive.plugins import list_entries
@@ -244,8 +244,8 @@ class ToolModel(Section):
         """Return the distance between the fingers after the release of an object [m]."""
         return 0.0
 
-    def list_points(self, object_class: ObjectClass, target: Target) -> list[tuple[GraspPoint, Array]]:
-        """Return the grasp points of an object, the best first, each with its place in the world `(3,)` [m].
+    def list_points(self, object_class: ObjectClass, target: Target) -> list[Array]:
+        """Return the places of the grasp points of an object in the world `(3,)` [m], the best first.
 
         If an image did not show which of its ends is which, each point is at two places.
 
@@ -255,7 +255,7 @@ class ToolModel(Section):
         X_WO = target.pose_at(target.stamp)
         to_top = np.array([0.0, 0.0, object_class.height / 2])
         if not object_class.grasp_points:
-            return [(GraspPoint((0.0, 0.0, object_class.height)), X_WO.position + to_top)]
+            return [X_WO.position + to_top]
         if target.yaw is None and object_class.contact_radius:
             raise Blocked(f"{target.item} can be held only at a known yaw, which no image showed")
         turn_count = 1
@@ -263,7 +263,7 @@ class ToolModel(Section):
             turn_count = target.yaw.symmetry // object_class.yaw_symmetry
         turns = [rotate_about_z(math.tau * index / turn_count) for index in range(turn_count)]
         return [
-            (point, X_WO.position - to_top + X_WO.rotation @ turn @ point.position)
+            X_WO.position - to_top + X_WO.rotation @ turn @ point.position
             for turn in turns
             for point in object_class.grasp_points
         ]
@@ -284,10 +284,11 @@ class ToolModel(Section):
         """
         raise NotImplementedError(f"{type(self).__name__} does not define `list_grasps`")
 
-    def compute_held_yaw(self, yaw: Yaw, tool_yaw: float) -> Yaw:
+    def compute_held_yaw(self, object_class: ObjectClass, yaw: Yaw, tool_yaw: float) -> Yaw:  # noqa: ARG002
         """Return the yaw of a held object relative to the tool; the default is that before the grasp.
 
         Args:
+            object_class: Class of the object.
             yaw: Measured yaw of the object before the grasp.
             tool_yaw: Yaw of the tool at the grasp [rad], as in `Goal.yaws`.
         """

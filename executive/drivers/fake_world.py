@@ -133,7 +133,11 @@ class FakeWorld:
             if gap > TOUCH_DISTANCE or fake_object is self.held_object:
                 continue
             offset = (fake_object.X_WO.rotation.T @ (tip_position - fake_object.position))[:2]
-            errors = [math.dist(point.position[:2], offset) for point in object_class.grasp_points]
+            # Images show the yaw up to the symmetry of the class.
+            count = max(object_class.yaw_symmetry, 1)
+            turns = [rotate_about_z(math.tau * index / count)[:2, :2] for index in range(count)]
+            points = [turn @ point.position[:2] for turn in turns for point in object_class.grasp_points]
+            errors = [math.dist(point, offset) for point in points]
             if min(errors or [abs(math.hypot(*offset) - object_class.contact_radius)]) <= MAX_GRIP_OFFSET:
                 return fake_object
         return None

@@ -77,7 +77,7 @@ def choose_grasp(
             obstacle = make_obstacle(cell, target)
             if grasp.guard == "touch" and object_class.grasp_points:
                 # The tool may be lower than parts of the object that are higher than the grasp point.
-                depth = object_class.height - min(point.position[2] for point in object_class.grasp_points)
+                depth = object_class.height - object_class.hold_height
                 obstacle = replace(obstacle, top=obstacle.top - depth)
             task = Task(obstacles=obstacles, target=obstacle, opening=grasp.opening)
             return replace(grasp, goal=replace(grasp.goal, yaws=yaws)), task
@@ -103,7 +103,9 @@ def measure_held_pose(cell: Cell, target: Target) -> HeldPose | None:
     if target.yaw is None or not any(bin.place_yaws for bin in cell.bins.values()):
         return None
     X_WT = cell.arm.tool_pose
-    held_yaw = cell.tool_model.compute_held_yaw(target.yaw, compute_tool_yaw(X_WT))
+    held_yaw = cell.tool_model.compute_held_yaw(
+        cell.classes[target.label], target.yaw, compute_tool_yaw(X_WT)
+    )
     x, y, _ = X_WT.inverse().apply(target.position).round(4).tolist()
     # The fingers move the object between them to the middle. The goal remains that of the plan ahead although
     # the arm trembles.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os.path
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
@@ -18,7 +19,7 @@ from executive.errors import InputError
 from executive.geometry import Array
 from executive.mission.arm_file import read_arm_file, repeat_numbers
 from executive.plugins import PACKAGE_PREFIX
-from executive.text.files import describe_outside_path, find_file_below, read_source
+from executive.text.files import describe_outside_path, find_file_below, is_outside_path, read_source
 from executive.text.findings import Finding, MissionError, Source, Span, make_error, sort_findings
 from executive.text.validate import BASE_KEY, KeyPath, find_span, override_cell, validate
 from executive.text.yaml_files import YamlMapping, YamlNode, YamlScalar, flatten, parse_yaml
@@ -34,6 +35,8 @@ CALIBRATION_KEYS: Mapping[str, str] = {
 }  # fmt: skip
 """Keys of a calibration by the keys of `camera_info` files, `CameraInfo` messages and files of OpenCV."""
 
+MESH_SUFFIXES = (".obj", ".stl", ".dae")
+"""Suffixes of the files of meshes."""
 MAX_BASE_COUNT = 5
 """Maximum number of files in the chain of bases of a cell file."""
 
@@ -356,25 +359,25 @@ def _resolve_model_files(
     detectors = {}
     for name, detector in config.detectors.items():
         # The options of a kind are unknown here; one of a base file may be the path of a file beside it.
-        options = {
-            key: resolve(value, "detectors", name, key)
-            for key, value in detector.options.items()
-            if isinstance(value, str)
-            and (source := file.find_span(("detectors", name, key)).source) != file.source
-            and os.path.isfile(paths.get(source, paths[file.source]).parent / value)
-        }
+        options = {}
+        for key, value in detector.options.items():
+            source = file.find_span(("detectors", name, key)).source
+            is_in_base = source in paths and source != file.source
+            if is_in_base and isinstance(value, str) and not is_outside_path(value):
+                options[key] = resolve(value, "detectors", name, key)
         detectors[name] = detector.model_copy(update=options)
     meshes = []
     for index, pattern in enumerate(config.unknown.meshes):
         keys = ("unknown", "meshes", index)
         folder = paths.get(file.find_span(keys).source, paths[file.source]).parent
-        if os.path.isabs(pattern) or ".." in Path(pattern).parts:
-            resolve(pattern, *keys)  # finds the error
-            continue
-        names = sorted(str(path.relative_to(folder)) for path in folder.glob(pattern))
+        names: list[str] = []
+        if not is_outside_path(pattern):
+            with suppress(ValueError, IndexError):  # no pattern
+                files = (path for path in folder.glob(pattern) if path.suffix.lower() in MESH_SUFFIXES)
+                names = sorted(str(path.relative_to(folder)) for path in files)
         meshes += [resolve(name, *keys) for name in names]
         if not names:
-            message = f"there is no file {pattern} beside the cell file"
+            message = f'there is no mesh ({", ".join(MESH_SUFFIXES)}) "{pattern}" beside the cell file'
             errors.append(file.make_error(keys, "robot", message))
     arm = config.arm.model_copy(update={"urdf": resolve(config.arm.urdf, "arm", "urdf")})
     tool = config.tool.replace_paths(lambda path, *keys: resolve(path, "tool", *keys))

@@ -227,14 +227,12 @@ def _compute_yaw(vertices: Vertices, density: float, object_class: ObjectClass) 
 def choose_skewness(vertices: Vertices) -> float:
     """Return the skewness of the enclosed area by which a half turn is recognized; 0 if there is none.
 
-    It is the skewness along the x axis, the longer one, or, if the ends look alike, that along the y axis.
+    It is the larger one of the skewnesses along the x axis, the longer one, and along the y axis. An object
+    with narrower ends has its skewness along x, a bent one along y.
     """
     # The unit millimetre keeps single-precision moments in range.
     points = np.column_stack([vertices.real, vertices.imag]) * 1000
     moments = cv2.moments(points.astype(np.float32).reshape(-1, 1, 2))
-    for axis in ("mu{}0", "mu0{}"):
-        variance, cube = (moments[axis.format(power)] for power in (2, 3))
-        skewness = float(cube * math.sqrt(moments["m00"]) / variance**1.5)
-        if abs(skewness) >= MIN_SKEWNESS:
-            return skewness
-    return 0.0
+    pairs = ((moments["mu30"], moments["mu20"]), (moments["mu03"], moments["mu02"]))
+    skewness = max((cube * math.sqrt(moments["m00"]) / variance**1.5 for cube, variance in pairs), key=abs)
+    return float(skewness) if abs(skewness) >= MIN_SKEWNESS else 0.0

@@ -294,12 +294,15 @@ class Fingers(ToolModel):
             cause = "fits between the fingers only at a known yaw, which no image showed"
             raise Blocked(f"{target.item} {cause}")
         grasps = []
-        widths = self._list_widths(object_class) if yaw else [(2 * object_class.radius, ())]
+        is_round = not object_class.yaw_symmetry
+        widths = self._list_widths(object_class) if yaw or is_round else [(2 * object_class.radius, ())]
         places = self.list_points(object_class, target)
         # Each grasp point has a width of its own; without grasp points, the middle has several.
         has_points = bool(object_class.grasp_points)
-        pairs = zip(places if has_points else places * len(widths), itertools.cycle(widths), strict=False)
-        for (_, (x, y, _)), (width, directions) in pairs:
+        pairs = [*zip(places if has_points else places * len(widths), itertools.cycle(widths), strict=False)]
+        # Another attempt begins with another point, or with the other end of an object whose ends look alike.
+        first = attempt.number % len(places)
+        for (x, y, _), (width, directions) in pairs[first:] + pairs[:first]:
             opening = width + 2 * self.allowance + attempt.number * OPENING_STEP
             yaws: tuple[float, ...] = ()
             if yaw and directions:
@@ -316,9 +319,14 @@ class Fingers(ToolModel):
             grasps.append(GraspPose(goal, end_height, guard="clear", opening=opening))
         return grasps
 
-    def compute_held_yaw(self, yaw: Yaw, tool_yaw: float) -> Yaw:
+    def compute_held_yaw(self, object_class: ObjectClass, yaw: Yaw, tool_yaw: float) -> Yaw:
         """Return the yaw of an object whose sides the fingers have turned parallel to the pads."""
-        held_yaw = super().compute_held_yaw(yaw, tool_yaw)
+        held_yaw = super().compute_held_yaw(object_class, yaw, tool_yaw)
+        if points := object_class.grasp_points:
+            turns = [
+                math.remainder(math.pi / 2 - point.direction - held_yaw.angle, math.pi) for point in points
+            ]
+            return held_yaw._replace(angle=held_yaw.angle + min(turns, key=abs))
         # Sides of the object and directions of the fingers are equal after these rotations.
         step = math.tau / math.lcm(4, yaw.symmetry)
         return held_yaw._replace(angle=round(held_yaw.angle / step) * step)
@@ -357,13 +365,18 @@ class Fingers(ToolModel):
 
         The yaws [rad] of a round object are (): every yaw is permitted.
         """
-        if object_class.grasp_points and object_class.yaw_symmetry:
-            sides = object_class.footprint or (2 * object_class.radius,)
-            return [
-                (point.width or min(sides), (point.direction - math.pi / 2, point.direction + math.pi / 2))
-                for point in object_class.grasp_points
-            ]
         footprint = object_class.footprint
+        if points := object_class.grasp_points:
+            length, width = footprint or (2 * object_class.radius, 2 * object_class.radius)
+            return [
+                (
+                    point.width or (width if abs(math.sin(point.direction)) > math.sqrt(0.5) else length),
+                    (point.direction - math.pi / 2, point.direction + math.pi / 2)
+                    if object_class.yaw_symmetry
+                    else (),
+                )
+                for point in points
+            ]
         if footprint is None or not object_class.yaw_symmetry:
             return [(2 * object_class.radius, ())]
         length, width = footprint

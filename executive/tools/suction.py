@@ -94,7 +94,7 @@ class Suction(ToolModel):
         """
         x, y, z = map(float, target.pose_at(target.stamp).position)
         places = self.list_points(object_class, target)
-        point, place = places[attempt.number % len(places)]
+        place = places[attempt.number % len(places)]
         # After n failed attempts, the contact point on a solid object lies on a Vogel spiral, at the distance
         # spacing * sqrt(n) and the angle n * GOLDEN_ANGLE; on an object with a hole, it lies on the ring.
         round_number = attempt.number // len(places)
@@ -103,7 +103,7 @@ class Suction(ToolModel):
         distance = ring or attempt.spacing * math.sqrt(round_number)
         contact_x = float(place[0]) + distance * math.cos(angle)
         contact_y = float(place[1]) + distance * math.sin(angle)
-        end_height = _compute_min_contact_height(object_class, z, attempt.overtravel, point.position[2])
+        end_height = _compute_min_contact_height(object_class, z, attempt.overtravel)
         if attempt.number >= ATTEMPTS_BEFORE_PROBE:
             end_height = min(end_height, z - object_class.height / 2 + PROBE_CLEARANCE)
         guarded_length = float(place[2]) + motion.descent - end_height
@@ -116,7 +116,9 @@ class Suction(ToolModel):
         )
         # The descent must end near the table, below the centre of the object, and within half of its radius.
         is_central = math.dist((contact_x, contact_y), (x, y)) <= object_class.radius / 2
-        proves_absence = is_central and end_height < z and end_height <= 2 * PROBE_CLEARANCE
+        # A grasp point may be low, and at the other end of the object.
+        is_probe = not object_class.grasp_points or attempt.number >= ATTEMPTS_BEFORE_PROBE
+        proves_absence = is_central and is_probe and end_height < z and end_height <= 2 * PROBE_CLEARANCE
         contact_height = end_height + guarded_length - motion.descent
         return (GraspPose(goal, contact_height, proves_absence),)
 
@@ -137,14 +139,13 @@ class Suction(ToolModel):
         tolerance = self._get_tolerance(object_class)
         if min(abs(height - each) for each in object_class.touch_heights) <= tolerance:
             return ToolMeasurement()
+        size = f"is {object_class.height * 1000:.0f} mm high"
+        if object_class.grasp_points:
+            size = f"is held {object_class.hold_height * 1000:.0f} mm above its underside"
         contradiction = (
-            f"it was touched {height * 1000:.0f} mm above the table, and a {object_class.label} is "
-            f"{object_class.height * 1000:.0f} mm high"
+            f"it was touched {height * 1000:.0f} mm above the table, and a {object_class.label} {size}"
         )
-        lowest_point = min((point.position[2] for point in object_class.grasp_points), default=None)
-        is_near_top = height >= _compute_min_contact_height(
-            object_class, float(position[2]), overtravel, lowest_point or object_class.height
-        )
+        is_near_top = height >= _compute_min_contact_height(object_class, float(position[2]), overtravel)
         touch_heights = [touch_height for each in classes.values() for touch_height in each.touch_heights]
         fits_no_class = min(abs(height - each) for each in touch_heights) > OTHER_CLASS_TOLERANCE
         is_low = height < object_class.hold_height
@@ -187,16 +188,14 @@ class Suction(ToolModel):
         )
 
 
-def _compute_min_contact_height(
-    object_class: ObjectClass, centre_height: float, overtravel: float, point_height: float
-) -> float:
+def _compute_min_contact_height(object_class: ObjectClass, centre_height: float, overtravel: float) -> float:
     """Return the minimum height of a contact with an object [m]; a lower contact misses the object.
 
-    The guarded motion continues below the expected surface, `point_height` above the underside, by
-    `overtravel` [m], at most halfway to the underside.
+    The guarded motion continues below the expected surface by `overtravel` [m], at most halfway to the
+    underside.
     """
-    middle = centre_height + (point_height - object_class.height) / 2
-    return max(middle + point_height / 2 - overtravel, middle)
+    middle = centre_height + (object_class.hold_height - object_class.height) / 2
+    return max(middle + object_class.hold_height / 2 - overtravel, middle)
 
 
 RIM_RAY_COUNT = 16

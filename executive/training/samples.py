@@ -124,6 +124,8 @@ class LabelledDataset:
         self._split = split
         self._source = splits[split]
         self.annotations: dict[Path, DatasetEntry] = {}
+        self._own_labels: dict[Path, tuple[str, ...]] = {}
+        """Class names of the objects in the dataset, by image, after `match_classes`."""
         self.notes: Counter[str] = Counter()
         self._relative_boxes = [np.zeros((0, 4))]
         is_coco = self._source.file.suffix == ".json"
@@ -189,7 +191,8 @@ class LabelledDataset:
         spellings = {name.casefold(): name for name in known} | {name: name for name in known}
         spellings |= {name.casefold(): label for name, label in class_map.items()}
         for path, entry in self.annotations.items():
-            pairs = ((label, label.strip().casefold()) for label in entry.labels)
+            own_labels = self._own_labels.setdefault(path, entry.labels)
+            pairs = ((label, label.strip().casefold()) for label in own_labels)
             labels = tuple(spellings.get(name, spellings.get(key, name)) for name, key in pairs)
             self.annotations[path] = replace(entry, labels=labels)
         if known and not self.object_counts.keys() & set(known):

@@ -56,7 +56,8 @@ def test_an_object_turns_from_its_yaw_to_that_of_the_slot(missions, name, label,
 
 
 def test_fingers_turn_the_sides_of_an_object_parallel_to_the_pads(missions: Path) -> None:
-    held_yaw = build_fake(missions, "iiwa_wsg50").cell.tool_model.compute_held_yaw(Yaw(1.7, 0.1, 4), 0.0)
+    cell = build_fake(missions, "iiwa_wsg50").cell
+    held_yaw = cell.tool_model.compute_held_yaw(cell.classes["cube"], Yaw(1.7, 0.1, 4), 0.0)
     assert held_yaw.angle == pytest.approx(math.pi / 2)
 
 

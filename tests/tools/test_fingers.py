@@ -85,6 +85,40 @@ def test_fingers_close_at_a_grasp_point_in_its_direction() -> None:
     assert np.cos(middle.goal.yaws) == pytest.approx([1, -1])
 
 
+def test_an_object_held_at_a_slant_has_this_yaw_in_the_fingers(config: CellConfig) -> None:
+    part = ObjectClass(
+        "part", 0.04, 0.05, footprint=(0.08, 0.03), yaw_symmetry=1,
+        grasp_points=(GraspPoint((0.0, 0.0, 0.02), 0.03, math.radians(60)),),
+    )  # fmt: skip
+    yaw = Yaw(0.3, 0.01, 1)
+    (grasp,) = list_grasps(part, yaw)
+    for tool_yaw in grasp.goal.yaws:
+        held = config.tool.compute_held_yaw(part, yaw, tool_yaw + 0.05)
+        assert held.angle == pytest.approx(yaw.angle - tool_yaw)
+
+
+def test_the_side_between_the_fingers_is_that_of_the_direction() -> None:
+    for direction, width in ((90, 0.1), (0, 0.03)):
+        point = GraspPoint((0.0, 0.0, 0.02), None, math.radians(direction))
+        part = ObjectClass(
+            "part", 0.04, 0.06, footprint=(0.03, 0.1), yaw_symmetry=2, grasp_points=(point,)
+        )  # fmt: skip
+        (grasp,) = list_grasps(part, Yaw(0.3, 0.0, 2))
+        assert width <= grasp.opening < width + 0.02
+    neck = ObjectClass("bottle", 0.04, 0.03, grasp_points=(GraspPoint((0.0, 0.0, 0.03), 0.015),))
+    (grasp,) = list_grasps(neck, None)
+    assert grasp.opening < 0.04
+
+
+def test_another_attempt_is_at_the_other_end_of_an_object_whose_ends_look_alike() -> None:
+    part = ObjectClass(
+        "part", 0.04, 0.05, footprint=(0.08, 0.03), yaw_symmetry=1, contact_radius=0.02,
+        grasp_points=(GraspPoint((0.02, 0.0, 0.02)),),
+    )  # fmt: skip
+    ends = [list_grasps(part, Yaw(0.0, 0.01, 2), number)[0].goal.position[0] for number in (0, 1)]
+    assert ends[0] - ends[1] == pytest.approx(0.04)
+
+
 def test_an_uncertain_yaw_a_failed_attempt_and_an_unknown_yaw_open_the_fingers_wider() -> None:
     openings = [
         list_grasps(CUBE, Yaw(0.0, std), number)[0].opening for std, number in ((0, 0), (0.05, 0), (0, 1))

@@ -64,6 +64,8 @@ def test_several_names_of_a_dataset_may_stand_for_one_class(tmp_path, samples):
     count = images.object_counts.total()
     images.match_classes(["shape"], "detector eye", {"Cube": "shape", "duck": "shape", "sphere": "shape"})
     assert images.object_counts == {"shape": count}
+    images.match_classes(["thing"], "detector ear", {"cube": "thing", "duck": "thing", "sphere": "thing"})
+    assert images.object_counts == {"thing": count}, "another cell has other names"
 
 
 @pytest.mark.parametrize("word", REFUSED)

@@ -116,6 +116,11 @@ def draw_object_colour(palette: Sequence[Colour], table_colour: Colour, rng: np.
     return float(red), float(green), float(blue)
 
 
+def draw_colour(model: ObjectConfig, table_colour: Colour, rng: Generator) -> Colour:
+    """Return a random colour of a model, or a random factor of the colours of its texture."""
+    return draw_tint(rng) if has_texture(model) else draw_object_colour(model.colours, table_colour, rng)
+
+
 def draw_tint(rng: np.random.Generator) -> Colour:
     """Return a random factor of the colours of a texture, which keeps them recognizable."""
     red, green, blue = rng.uniform(0.65, 1.0) * rng.uniform(0.85, 1.0, 3)
@@ -237,11 +242,10 @@ def draw_objects(config: CellConfig, count: int, table_colour: Colour, rng: Gene
     unknown_fraction = rng.uniform(0.05, 0.4) if rng.random() < 0.35 else 0.0
     scaled_fraction = rng.uniform(0.2, 1.0) if rng.random() < 0.35 else 0.0
     objects = []
-    for label in map(str, rng.choice(list(config.objects), count)):
-        model = config.objects[label].draw_model(rng)
-        colour = (
-            draw_tint(rng) if has_texture(model) else draw_object_colour(model.colours, table_colour, rng)
-        )
+    for name in map(str, rng.choice(list(config.objects), count)):
+        label = name
+        model = config.objects[name].draw_model(rng)
+        colour = draw_colour(model, table_colour, rng)
         if rng.random() < unknown_fraction:
             label = UNKNOWN_LABEL
             if config.unknown.meshes and rng.random() < OWN_UNKNOWN_FRACTION:
@@ -249,6 +253,8 @@ def draw_objects(config: CellConfig, count: int, table_colour: Colour, rng: Gene
             else:
                 model = load_unknown_model(name_unknown_model(int(rng.choice(TRAINING_MODEL_NUMBERS))))
                 model = scale_model(model, rng.uniform(0.4, 1.0))
+            if has_texture(model) != has_texture(config.objects[name]):
+                colour = draw_colour(model, table_colour, rng)
         elif rng.random() < scaled_fraction:
             model = scale_model(model, float(rng.choice(SCALE_FACTORS)))
         objects.append(TrueObject(label, Pose.identity(), model=model, colour=colour))

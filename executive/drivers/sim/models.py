@@ -185,11 +185,14 @@ def compute_mass(config: ObjectConfig) -> float:
 
 
 def measure_hold(config: CellConfig, label: str) -> float:
-    """Return the largest force with which the tool can hold the model of a class [N].
+    """Return the largest force with which the tool can hold each model of a class [N].
 
     The tool is at the places of the first attempts: at a grasp point, on the ring or near the middle.
     """
-    section = config.objects[label]
+    return min(_measure_hold(config, section) for section in config.objects[label].list_models())
+
+
+def _measure_hold(config: CellConfig, section: ObjectConfig) -> float:
     mesh = load_mesh(section)
     X_WO = Pose.of([0.0, 0.0, -mesh.bottom])
     middle_x, middle_y = ((mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0))[:2] / 2).tolist()
@@ -219,10 +222,16 @@ def find_model_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
                 if not model_files.is_shipped(path):
                     _try_in_child_process(object_config, path, path.stat().st_mtime_ns)
                 compute_mass(object_config)
-                yield from _find_wrong_sizes(label, object_config)
+                for key, message in _find_wrong_sizes(label, object_config):
+                    yield ("objects", label, "variants", index - 1) if index else key, message
             except InputError as error:
-                key = ("mesh" if section.mesh else "urdf",) if index == 0 else ("variants", index - 1)
-                yield ("objects", label, *key), str(error)
+                keys = ("mesh" if section.mesh else "urdf",) if index == 0 else ("variants", index - 1)
+                yield ("objects", label, *keys), str(error)
+    for mesh in config.unknown.meshes:
+        try:
+            load_unknown_model(mesh)
+        except InputError as error:
+            yield ("unknown", "meshes"), str(error)
 
 
 def _find_wrong_sizes(label: str, config: ObjectConfig) -> Iterator[tuple[KeyPath, str]]:
@@ -231,25 +240,32 @@ def _find_wrong_sizes(label: str, config: ObjectConfig) -> Iterator[tuple[KeyPat
     The executive computes the centre, the top and the free space of an object from height and radius.
     """
     mesh = load_mesh(config)
+    has_size = True
     for name, model_size in (("height", mesh.top - mesh.bottom), ("radius", mesh.radius)):
         declared_size = getattr(config, name)
         if not abs(declared_size - model_size) <= SIZE_TOLERANCE:  # also True for NaN
             message = f"the model of {label} has a {name} of {model_size:.4f} m, not {declared_size:g} m; "
             yield ("objects", label, name), message + f"correct {name}, scale or upright_deg"
+            has_size = False
     for x, y, z in (grasp.point for grasp in config.grasps):
         if z > (top := mesh.measure_top(x, y)) + SIZE_TOLERANCE:
             surface = f"the surface is {top * 1000:.1f} mm high" if top >= 0 else "there is no surface"
             message = f"the grasp point {x:g}, {y:g}, {z:g} m is outside of the {label}: {surface} there"
             yield ("objects", label, "grasp"), message
-    if config.yaw_symmetry == 1:
+    if config.yaw_symmetry == 1 and has_size:
         outlines, _ = cv2.findContours(
             _draw_silhouette(mesh, mesh.vertices[:, :2] * 1000), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE
         )
         outline = max(outlines, key=cv2.contourArea)[:, 0]
-        vertices = outline @ [1, 1j] * np.exp(-1j * math.radians(config.yaw_offset_deg or 0.0))
-        if not choose_skewness(vertices):
+        offset = config.build_class(label).yaw_offset
+        skewness = choose_skewness(outline @ [1, 1j] * np.exp(-1j * offset))
+        if not skewness:
             message = f"no outline shows a half turn of the model of {label}; write yaw_symmetry: 2"
             yield ("objects", label, "yaw_symmetry"), message
+        elif skewness < 0:
+            turned = math.degrees(math.remainder(offset + math.pi, math.tau))
+            message = f"the narrower end or the ends of the bend of the model of {label} point the other way"
+            yield ("objects", label, "yaw_symmetry"), f"{message}; write yaw_offset_deg: {turned:g}"
     if config.footprint is None:
         return
     corners = cv2.convexHull(mesh.vertices[:, :2].astype(np.float32))[:, 0] @ [1, 1j]
@@ -402,8 +418,12 @@ def name_unknown_model(number: int) -> str:
 def load_unknown_model(path: str) -> ObjectConfig:
     """Return the model of an object of no class, a URDF or a mesh."""
     key = "urdf" if path.endswith(".urdf") else "mesh"
-    mesh = load_mesh(ObjectConfig.model_validate({key: path, "height": 1.0, "radius": 1.0}))
-    return ObjectConfig.model_validate({key: path, "height": mesh.top - mesh.bottom, "radius": mesh.radius})
+    config = ObjectConfig.model_validate({key: path, "height": 1.0, "radius": 1.0})
+    mesh = load_mesh(config)
+    sizes = {"height": mesh.top - mesh.bottom, "radius": mesh.radius}
+    if not 0 < max(sizes.values()) <= 1:
+        raise InputError(f"the model {path} is {max(sizes.values()):g} m large; scale it to metres")
+    return config.model_copy(update=sizes)
 
 
 SUBPIXEL_COUNT = 4

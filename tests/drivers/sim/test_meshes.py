@@ -121,6 +121,42 @@ def test_a_model_that_looks_the_same_after_a_half_turn_has_no_yaw_symmetry_of_1(
     ]
 
 
+@pytest.mark.parametrize(
+    ("scale", "offset", "finding"), [(1, 0, ""), (-1, 0, "yaw_offset_deg: 180"), (-1, 180, "")]
+)
+def test_the_narrower_end_points_along_the_yaw(
+    overhead: CellConfig, tmp_path: Path, scale: float, offset: float, finding: str
+) -> None:
+    # A roof, seen from above: a trapezoid with its narrower end at positive x.
+    corners = [(-0.02, -0.01), (0.02, -0.004), (0.02, 0.004), (-0.02, 0.01)]
+    vertices = [(scale * x, y, z) for z in (0, 0.02) for x, y in corners]
+    faces = ["1 2 3 4", "8 7 6 5", "1 5 6 2", "2 6 7 3", "3 7 8 4", "4 8 5 1"]
+    lines = [*("v {:g} {:g} {:g}".format(*vertex) for vertex in vertices), *(f"f {face}" for face in faces)]
+    path = tmp_path / "end.obj"
+    path.write_text("\n".join(lines) + "\n")
+    part = ObjectConfig(
+        mesh=str(path),
+        height=0.02,
+        radius=0.0224,
+        footprint=(0.04, 0.02),
+        yaw_symmetry=1,
+        yaw_offset_deg=offset,
+    )
+    found = [message for _, message in find_model_errors(with_objects(overhead, part=part))]
+    assert [finding in message for message in found] == ([True] if finding else [])
+
+
+def test_a_variant_that_the_tool_cannot_hold_counts(overhead: CellConfig, wedge: ObjectConfig) -> None:
+    cube = ObjectConfig(mesh=str(Path(wedge.mesh).with_name("cube.obj")), height=0.03, radius=0.0112)
+    plate = [f"v {x} {y} {z}" for z in (0, 0.03) for x, y in ((0, 0), (0.03, 0), (0.03, 0.03), (0, 0.03))]
+    faces = ["f 4 3 2 1", "f 5 6 7 8", "f 1 2 6 5", "f 2 3 7 6", "f 3 4 8 7", "f 4 1 5 8"]
+    Path(cube.mesh).write_text("\n".join([*plate, *faces]) + "\n")
+    both = cube.model_copy(update={"variants": (wedge.mesh,)})
+    config = with_objects(overhead, cube=cube, both=both)
+    assert measure_hold(config, "cube") > 1
+    assert measure_hold(config, "both") == 0
+
+
 def test_a_cup_holds_no_edge_and_no_surface_that_is_smaller_than_itself(
     overhead: CellConfig, wedge: ObjectConfig
 ) -> None:
