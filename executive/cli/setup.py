@@ -205,17 +205,29 @@ def _write_project_from(folder: Path, package: str, name: str) -> list[str]:
     Raises:
         InputError: There is no such mission, or the project cannot be written.
     """
-    from executive.text.files import find_cell, find_mission
+    from executive.text.files import get_shipped_folder, list_shipped_missions
+    from executive.text.findings import suggest_choice
 
-    text = find_mission(name).read_text(encoding="utf-8")
-    head = {key: re.search(rf"(?m)^{key}: *(.+)$", text) for key in ("mission", "description", "cell")}
-    mission, description, cell_path = (match[1] if match else "" for match in head.values())
-    cell = Path(cell_path).stem
-    lines = find_cell(cell).read_text(encoding="utf-8")
-    sections = re.findall(r"(?m)^(?:table|bins):.*\n(?:[ #].+\n)*", lines)
+    if name not in (names := list_shipped_missions()):
+        raise InputError(f'there is no shipped mission "{name}". {suggest_choice(name, names, "There are")}')
+
+    def read(file: Path) -> tuple[str, dict[str, str]]:
+        """Return the text of a shipped file, and the text of each of its sections by key."""
+        text = file.read_text(encoding="utf-8")
+        return text, {part[1]: part[0].strip() for part in re.finditer(r"(?m)^(\w+):.*\n(?:[ #].+\n)*", text)}
+
+    folder_of_cells = get_shipped_folder() / "cells"
+    text, head = read(get_shipped_folder() / f"{name}.yaml")
+    cell = base = Path(head["cell"].partition(": ")[2]).stem
+    sections: dict[str, str] = {}
+    while base:
+        _, found = read(folder_of_cells / f"{base}.yaml")
+        sections = found | sections
+        base = Path(found.get("base", "").partition(": ")[2]).stem
     values = {
-        "mission": mission, "description": description, "cell": cell, "sections": "\n".join(sections).strip(),
-        "mission_text": text.strip().replace(f"cell: {cell_path}", "cell: cells/table.yaml"),
+        "mission": name, "description": head["description"].removeprefix("description: "), "cell": cell,
+        "sections": "\n\n".join(sections[key] for key in ("table", "bins")),
+        "mission_text": text.strip().replace(head["cell"], "cell: cells/table.yaml"),
     }  # fmt: skip
     return write_project(folder, package, values, source=MISSION_TEMPLATE)
 

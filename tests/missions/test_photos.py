@@ -10,19 +10,29 @@ from pathlib import Path
 import pytest
 from at_terminal import invoke
 
+from executive.mission.cell_file import load_cell
+from executive.training.dataset import DatasetEntry, build_image_path, save_image, write_annotations
+from executive.training.rendering import render_run_frames
+
 NAMES = {"bolt": "Hex Bolt", "nut": "nut-M8", "washer": "Washer"}
 """Names of the classes in the data set."""
 
 
-def export(folder: Path, layout: str) -> None:
-    """Write images of the cell `fasteners` as a data set whose classes have other names."""
-    words = ("--images", "30", "--seed", "5", "--valid", "0.5", "--format", layout)
-    assert invoke("dataset", "fasteners", "--out", str(folder), *words).exit_code == 0
-    for file in [*folder.rglob("*.json"), *folder.rglob("*.yaml")]:
-        text = file.read_text()
-        for label, name in NAMES.items():
-            text = re.sub(rf"\b{label}\b", name, text)
-        file.write_text(text)
+def export(missions: Path, folder: Path, layout: str) -> None:
+    """Write photos of the table of the cell `fasteners`, whose classes have other names."""
+    cell = load_cell(missions / "cells" / "fasteners.yaml")
+    left, top, right, bottom = next(iter(cell.cameras.values())).table_view
+    entries = []
+    for index, one in enumerate(
+        render_run_frames(cell, image_count=60, seed=5, worker_count=1, progress=lambda _done, _all: None)
+    ):
+        photo = one.image[top:bottom, left:right]
+        file = f"{index}.png"
+        save_image(build_image_path(folder, layout, "valid", file), photo)
+        boxes = tuple((x - left, y - top, right_x - left, low - top) for x, y, right_x, low in one.boxes)
+        labels = tuple(NAMES[label] for label in one.labels)
+        entries.append(DatasetEntry("valid", file, (photo.shape[1], photo.shape[0]), labels, boxes))
+    write_annotations(folder, layout, entries, [*NAMES.values()])
 
 
 def read_example(missions: Path, head: str) -> str:
@@ -37,8 +47,10 @@ def test_a_data_set_of_others_becomes_a_mission(
     missions: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, layout: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    export(tmp_path / "export", layout)
-    trained = tmp_path / "cells" / "trained"
+    export(missions, tmp_path / "export", layout)
+    folder = re.search(r"--out (\S+)", (missions / "photos.md").read_text())
+    assert folder is not None
+    trained = tmp_path / folder[1]
     trained.mkdir(parents=True)
     # A training takes too long here; this model knows the same objects.
     shutil.copy(missions / "cells" / "fasteners" / "model.onnx", trained)
