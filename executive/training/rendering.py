@@ -32,6 +32,7 @@ from executive.drivers.sim.camera import (
     get_camera_pose,
     render,
 )
+from executive.drivers.sim.model_check import find_model_errors
 from executive.drivers.sim.scene import DECLARED_SCENE, SceneConfig, build_world
 from executive.drivers.sim.spawn import spawn_objects
 from executive.drivers.sim.world import WOOD_TEXTURE
@@ -85,7 +86,7 @@ def generate_dataset(
             cell file, or a file cannot be written.
     """
     for cell in cells:
-        for key, message in (*models.find_model_errors(cell), *find_arm_model_errors(cell.arm)):
+        for key, message in (*find_model_errors(cell), *find_arm_model_errors(cell.arm)):
             raise InputError(f"{cell.cell}: {'.'.join(map(str, key))}: {message}")
     train_count = image_count - round(image_count * valid_fraction)
     render_block = partial(_render_dataset_images, cells, out, layout, seed, train_count)

@@ -19,7 +19,8 @@ from executive.cell.objects import BIN_THICKNESS
 from executive.drivers import world_log
 from executive.drivers.sim.arm import SimArm
 from executive.drivers.sim.camera import SimCamera, find_missing_depth_sensors
-from executive.drivers.sim.models import compute_mass, find_model_errors, measure_hold
+from executive.drivers.sim.model_check import find_model_errors, measure_hold
+from executive.drivers.sim.models import compute_mass
 from executive.drivers.sim.spawn import build_world_of_run, find_object_count_errors
 from executive.drivers.sim.tool import SimTool
 from executive.drivers.sim.world import SimVisuals, World

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from executive.cell.config import CellConfig, ObjectConfig
-from executive.drivers.sim import models
-from executive.drivers.sim.models import find_model_errors, load_mesh, try_model
+from executive.drivers.sim import model_check
+from executive.drivers.sim.model_check import find_model_errors, try_model
+from executive.drivers.sim.models import load_mesh
 from executive.errors import InputError
 from executive.physics.model_files import read_mesh
 
@@ -130,8 +131,8 @@ def test_the_child_process_reads_a_model_first_and_once_and_may_crash(
     part = write(tmp_path, BOX).model_copy(update={"height": 0.1})
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    monkeypatch.setattr(models, "TRIAL_TIMEOUT", 0.2)
-    monkeypatch.setattr(models, "build_command", lambda *_: ["sh", "-c", script, str(tmp_path)])
+    monkeypatch.setattr(model_check, "TRIAL_TIMEOUT", 0.2)
+    monkeypatch.setattr(model_check, "build_command", lambda *_: ["sh", "-c", script, str(tmp_path)])
     config = overhead.model_copy(update={"objects": {"part": part}})
     (_, (_, message)) = [*find_model_errors(config), *find_model_errors(config)]
     assert reason in message

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from executive.cell.config import CellConfig, GraspConfig, ObjectConfig
-from executive.drivers.sim.models import find_model_errors, load_mesh, measure_hold
+from executive.drivers.sim.model_check import find_model_errors, measure_hold
+from executive.drivers.sim.models import load_mesh
 from executive.drivers.sim.world import World
 from executive.errors import InputError
 from executive.geometry import Pose, rotate_about_z
