@@ -46,7 +46,7 @@ KEYS = "key, value, default, meaning"
 DETECTOR_OPTIONS = {
     "embedded": None, "noisy": NoisyOptions, "rfdetr": RfdetrOptions, "roboflow": RoboflowOptions,
 }  # fmt: skip
-DEFINITIONS = {
+DEFINITIONS = {"expression": "expression after `=`", "formula": "expression",
     "node": "node", "reason": "reason", "variable": "name of a variable",
     "ParamKeys": "param", "SubtreeKeys": "subtree",
 }  # fmt: skip
@@ -57,7 +57,7 @@ VALUES_IN_WORDS = {
     "trees": "names with subtrees",
     "args": "list of names, or names with values",
     "with": "names with values",
-    "until": "reason, section, or list of both",
+    "until": "reason, expression after `=`, or list of both",
     "catch": "section, or list of sections",
 }
 """Values of keys whose schemas are too long for a sentence."""

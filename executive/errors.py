@@ -110,6 +110,10 @@ class Stopped(BaseException):
     """
 
 
+class Finished(BaseException):
+    """The mission ends with success at once; the message is the reason why open items are skipped."""
+
+
 class Interrupted(KeyboardInterrupt):
     """A signal that ends the process at once; a `KeyboardInterrupt` of a skill is a fault like any other."""
 

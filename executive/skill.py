@@ -74,6 +74,8 @@ class Param:
         choices: Allowed values, or None for any value.
         refers_to: Kind of the name (`bin`, `detector`, `pose`, `class`) if the value is a name; otherwise "".
         doc: Description of the param.
+        candidate: For a function of one object: name of the variable that contains the object in the
+            expression of the mission; otherwise "".
     """
 
     name: str
@@ -85,6 +87,7 @@ class Param:
     choices: tuple[Any, ...] | None
     refers_to: str
     doc: str
+    candidate: str = ""
 
     @property
     def is_required(self) -> bool:
@@ -108,8 +111,6 @@ class Port:
         default: Value of an input whose variable is unwritten; `...` if the variable must be written.
         refers_to: Kind of the name (`item`, `bin`, `class`) if the value is a name; otherwise "".
         doc: Description of the port.
-        compared_with: Name of the input with which the skill compares this input, or "". If a mission sets
-            this input to a constant, the checker reports a constant that the other input never equals.
     """
 
     name: str
@@ -118,7 +119,6 @@ class Port:
     default: Any
     refers_to: str
     doc: str
-    compared_with: str = ""
 
     @property
     def is_required(self) -> bool:
@@ -134,16 +134,17 @@ def param(
     choices: tuple[Any, ...] | None = None,
     refers_to: str = "",
     doc: str = "",
+    candidate: str = "",
 ) -> Any:
     """Declare a param of a skill; `Param` describes the arguments."""
     # `Skill.__init_subclass__` sets name, type and unit.
-    return Param("", None, "", default, ge, le, choices, refers_to, doc)
+    return Param("", None, "", default, ge, le, choices, refers_to, doc, candidate)
 
 
-def port(*, default: Any = ..., refers_to: str = "", doc: str = "", compared_with: str = "") -> Any:
+def port(*, default: Any = ..., refers_to: str = "", doc: str = "") -> Any:
     """Declare a port of a skill; `Port` describes the arguments."""
     # `Skill.__init_subclass__` sets name, type and direction.
-    return Port("", None, Direction.IN, default, refers_to, doc, compared_with)
+    return Port("", None, Direction.IN, default, refers_to, doc)
 
 
 class SkillFailed(Exception):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 from executive.cell.objects import Item, Target
 from executive.cell.protocols import Cell
@@ -30,6 +31,8 @@ class SelectTarget(Skill):
     * `surest` prefers the target with the highest confidence of the last detection.
     * `least_tried` prefers the fewest failed attempts and, of several such targets, the nearest.
     * With `among`, the skill fails with `no_candidate` as soon as none of these items is open or lost.
+    * With `where`, only targets for which this expression is true are candidates.
+    * With `order_by`, the target with the smallest value of this expression comes first.
     * With `same`, the skill fails with `no_candidate` if the item is held, placed, rejected or skipped, or
       after `attempts` failed attempts to pick it.
     """
@@ -47,6 +50,12 @@ class SelectTarget(Skill):
         choices=("shortest_tour", "nearest", "surest", "least_tried"),
         doc="the first of the `shortest_tour`, the `nearest`, the `surest` or the `least_tried` target",
     )
+    where: Callable[[Target], bool] | None = param(
+        None, candidate="target", doc="expression that is true for the candidates, with `$target`"
+    )
+    order_by: Callable[[Target], float] | None = param(
+        None, candidate="target", doc="expression whose smallest value comes first, with `$target`"
+    )
     attempts: int = param(100, ge=1, doc="number of failed attempts after which `same` is no candidate")
     reasons = ("no_candidate", "unseen", "doubtful")
 
@@ -58,6 +67,13 @@ class SelectTarget(Skill):
         candidates = [target for target in pickable_targets if self._is_requested(cell, target.item)]
         if not candidates:
             raise self._make_failure_without_candidate(cell)
+        if self.where is not None:
+            chosen = list(filter(self.where, candidates))
+            if not chosen:
+                # The others do not matter: what is left is unseen, doubtful or nothing.
+                self.not_ = [*(self.not_ or ()), *(target.item for target in candidates)]
+                raise self._make_failure_without_candidate(cell)
+            candidates = chosen
         if self.prefer == "shortest_tour":
             candidates = sort_by_tour(cell, candidates)
         # The candidates are sorted by distance or tour, and `min` returns the first of equal ones.
@@ -74,6 +90,8 @@ class SelectTarget(Skill):
         """Return the sort key of a candidate; the smallest key comes first."""
         known = cell.ledger.describe(target.item)
         is_blocked = bool(explain_blocked_grasp(cell, target))
+        if self.order_by is not None:
+            return known.deferral_rank, is_blocked, self.order_by(target)
         if self.prefer == "surest":
             return known.deferral_rank, is_blocked, -target.confidence, target.item
         attempts = known.attempts if self.prefer == "least_tried" else 0

@@ -21,6 +21,7 @@ def set_final_states(
     undeclared_labels: Collection[str],
     *,
     is_completed: bool,
+    finish_reason: str = "",
 ) -> None:
     """Set and emit the final state of each item.
 
@@ -30,6 +31,7 @@ def set_final_states(
         explain_skipped_item: Function that returns the reason why the mission does not sort an item, or "".
         undeclared_labels: Classes that the cell does not declare.
         is_completed: True if the behaviour tree succeeded.
+        finish_reason: Reason why the mission finished with open items, or "".
     """
     dropped = records.filter_by_state(State.DROPPED)
     dropped_items = [record for record in dropped if not record.was_taken_away]
@@ -37,8 +39,9 @@ def set_final_states(
         skip_reason = explain_skipped_item(record)
         is_declared = record.label not in undeclared_labels
         final_state = find_final_state(
-            record, certainty, skip_reason, is_declared=is_declared, is_completed=is_completed
-        )
+            record, certainty, skip_reason, is_declared=is_declared, is_completed=is_completed,
+            finish_reason=finish_reason,
+        )  # fmt: skip
         if bin := find_probable_bin(record):
             record.bin = bin
             final_state = (State.PLACED, REASON_PROBABLY_FELL)
@@ -49,8 +52,9 @@ def set_final_states(
 
 
 def find_final_state(
-    record: ItemRecord, certainty: Certainty, skip_reason: str, *, is_declared: bool, is_completed: bool
-) -> tuple[State, str] | None:
+    record: ItemRecord, certainty: Certainty, skip_reason: str, *, is_declared: bool, is_completed: bool,
+    finish_reason: str = "",
+) -> tuple[State, str] | None:  # fmt: skip
     """Return the final state of an item and the reason, or None if the current state is final.
 
     The first rule that applies determines the state:
@@ -67,9 +71,10 @@ def find_final_state(
     7. An item that is already rejected stays rejected.
     8. An item whose class has no route, or no bin below its quota, is skipped; it is rejected if images
        contradict a bin of its class, or if its class is undeclared.
-    9. If the mission was completed, an item with sufficient evidence (`is_certain`), no failed attempt
+    9. If the mission finished with a reason, the item is skipped with this reason.
+    10. If the mission was completed, an item with sufficient evidence (`is_certain`), no failed attempt
        and no evidence against its class is skipped, because a quota was reached or the operator quit.
-    10. Any other item is rejected.
+    11. Any other item is rejected.
 
     Args:
         record: The item.
@@ -77,6 +82,7 @@ def find_final_state(
         skip_reason: Reason why the mission does not sort objects of the item's class, or "".
         is_declared: True if the cell declares the item's class.
         is_completed: True if the behaviour tree succeeded.
+        finish_reason: Reason why the mission finished with open items, or "".
     """
     belief = record.belief
     if record.state is State.HELD:
@@ -100,6 +106,8 @@ def find_final_state(
     if skip_reason:
         is_skipped = is_declared and not skip_reason.startswith(REASON_CONTRADICTED)
         return State.SKIPPED if is_skipped else State.REJECTED, skip_reason
+    if finish_reason:
+        return State.SKIPPED, finish_reason
     had_problem = record.failed_pick_count or record.last_contradiction
     if is_completed and certainty.is_certain(record) and not had_problem:
         return State.SKIPPED, "the mission was completed without it"

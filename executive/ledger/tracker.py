@@ -277,7 +277,7 @@ class Tracker:
                 self._bin_contents.contradictions[name] = appearance.contradiction
                 self.unexplained.report(f"bin {name}", appearance.contradiction, frame=frame.id)
 
-    def set_final_states(self, *, completed: bool) -> None:
+    def set_final_states(self, *, completed: bool, finish_reason: str = "") -> None:
         assumptions = (self._bin_contents.describe_unseen_bins(), self._load_cell.assumption)
         self.assumption_reasons += [assumption for assumption in assumptions if assumption]
         for name, view in self._bin_contents.views.items():
@@ -285,7 +285,7 @@ class Tracker:
                 self.unexplained.report(f"contents {name}", view.change)
         set_final_states(
             self._records, self._certainty, self._explain_skipped_item, self.unknown_labels,
-            is_completed=completed,
+            is_completed=completed, finish_reason=finish_reason,
         )  # fmt: skip
         for record in self._records.all:
             if record.may_have_left and record.label not in self.unknown_labels:

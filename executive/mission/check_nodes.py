@@ -21,9 +21,9 @@ from executive.text.findings import (
     suggest_word,
 )
 from executive.tree.flow import UNKNOWN_NAME, Flow, FlowState, PossibleFailure, PossibleToolState
-from executive.tree.keys import PREDEFINED_LISTS, KeySection, KeyValue, list_nodes
+from executive.tree.keys import PREDEFINED_LISTS, AnyValue, Elements, KeySection, KeyValue, list_nodes
 from executive.tree.node import ControlNode, NodeAnalysis
-from executive.tree.specification import Constant, Node, Reason, Reference, SkillNode, SubtreeNode
+from executive.tree.specification import Constant, Expression, Node, Reason, Reference, SkillNode, SubtreeNode
 
 
 def check_constants(context: CheckContext) -> Iterator[Finding]:
@@ -37,11 +37,15 @@ def _check_keys(context: CheckContext, owner: ControlNode | KeySection, name: st
         for item in value if isinstance(value, tuple) else (value,):
             if isinstance(item, KeySection):
                 yield from _check_keys(context, item, key.name)
+        if key.value_type == AnyValue:
+            continue
+        if key.accepts_expression and isinstance(value, Expression):
+            continue
         if key.is_constant:
             validator = key.make_validator(owner.find_max(key, vars(owner)))
             yield from check_constant(context, f"{name}.{key.name}", validator, value)
         elif (
-            key.is_plain
+            key.value_type == Elements
             and isinstance(value, Constant)
             and not isinstance(value.value, list)
             and value.value not in PREDEFINED_LISTS
@@ -59,7 +63,9 @@ def check_constant(
     context: CheckContext, name: str, validator: TypeAdapter[object], value: KeyValue
 ) -> Iterator[Finding]:
     """Yield an error if `value` is a variable or no valid constant; `name` is the subject of the message."""
-    if isinstance(value, Reference):
+    if isinstance(value, Expression):
+        yield make_error(value.span, "wrong-type", f"{name} must be a constant, not an expression")
+    elif isinstance(value, Reference):
         message = f"{name} must be a constant, but ${value.name} is neither a param nor an argument"
         yield make_error(value.span, "unknown-param", message, context.make_unknown_param_hint(value))
     elif isinstance(value, Constant):
@@ -108,8 +114,12 @@ def find_non_conditions(context: CheckContext, parent: ControlNode) -> Iterator[
             if problem := _find_problem(context, node):
                 message = f"{problem}, but {parent.type_name}.{key.name} needs a condition"
                 conditions = [name for name, skill in context.skills.items() if skill.is_condition]
-                words = [word for word, one in context.node_classes.items() if one.is_condition]
-                hint = f"Conditions: {', '.join(conditions)}; they are combined by {', '.join(words)}."
+                classes = context.node_classes.items()
+                words = [word for word, one in classes if one.is_condition and "do" in one.keys]
+                hint = (
+                    f"Conditions: {', '.join(conditions)}, and expressions such as run.placed > 3; they are "
+                    f"combined by {', '.join(words)}."
+                )
                 yield make_error(node.span, "no-condition", message, hint)
 
 
@@ -218,8 +228,8 @@ def _find_reasons(flow: FlowAnalysis, body: Node) -> dict[str, list[str]]:
         if isinstance(node, SkillNode):
             skill = flow.find_skill_or_most_similar(node.skill)
             reasons.setdefault(node.skill, []).extend(skill.reasons if skill else ())
-        elif isinstance(node, ControlNode) and node.reasons:
-            reasons.setdefault(node.keyword, []).extend(node.reasons)
+        elif isinstance(node, ControlNode) and node.own_reasons:
+            reasons.setdefault(node.keyword, []).extend(node.own_reasons)
         if node.label and node.path in flow.flows:
             failures = flow.flows[node.path].failures
             reasons.setdefault(node.label, []).extend(failure.reason for failure in failures)
@@ -266,10 +276,13 @@ def check_tool_states(context: CheckContext) -> Iterator[Finding]:
 def check_tool_at_end(context: CheckContext) -> Iterator[Finding]:
     """Yield a warning if the mission may succeed with an object in the tool."""
     flow = context.flow_analysis
-    span = context.tree.span
-    if flow.root_flow.success and (tool := flow.root_flow.success.find_tool_state(HOLDING)):
-        message = "the mission may succeed with an object in the tool"
-        yield make_warning(span, "tool-state", message, _explain_tool_state(flow, tool, span))
+    finishes = [node for node in context.control_nodes if node.ends_mission]
+    ends = [(context.tree.span, flow.root_flow.success)]
+    ends += [(node.span, flow.entry_states.get(node.path)) for node in finishes]
+    for span, state in ends:
+        if state and (tool := state.find_tool_state(HOLDING)):
+            message = "the mission may succeed with an object in the tool"
+            yield make_warning(span, "tool-state", message, _explain_tool_state(flow, tool, span))
 
 
 def _explain_tool_state(flow: FlowAnalysis, tool: PossibleToolState, span: Span) -> str:

@@ -20,7 +20,14 @@ from executive.mission.mission_file import Mission
 from executive.mission.ports import find_literals, find_problem
 from executive.skill import HOLDING, Direction, Param, Port, Skill
 from executive.text.findings import Finding, Span, make_error, make_warning, suggest_choice
-from executive.tree.specification import Constant, LocatedName, Reference, SkillNode
+from executive.tree.specification import Constant, Expression, LocatedName, Reference, SkillNode
+
+REPLACED_SKILLS = {
+    "IsEqual": '$target.label == "cube"',
+    "HasCounted": "run.placed >= 4",
+    "HasElapsed": "run.elapsed >= 30",
+}
+"""Expressions in place of skills of earlier versions."""
 
 
 def find_unknown_skills(context: CheckContext) -> Iterator[Finding]:
@@ -28,6 +35,8 @@ def find_unknown_skills(context: CheckContext) -> Iterator[Finding]:
     for node in context.nodes:
         if isinstance(node, SkillNode) and node.skill not in context.skills:
             hint = suggest_choice(node.skill, context.skills, "Installed skills")
+            if expression := REPLACED_SKILLS.get(node.skill):
+                hint = f"Write the expression `{expression}` in its place, for instance below `holds`."
             yield make_error(node.span, "unknown-skill", f'there is no skill "{node.skill}"', hint)
 
 
@@ -42,6 +51,10 @@ def check_settings(context: CheckContext) -> Iterator[Finding]:
                     hint = f"A condition writes no output. Skills that write ${name}: {writers}."
                 message = f'{node.skill} has no param or port "{name}"'
                 yield make_error(name.span, "unknown-param", message, hint)
+            elif isinstance(value, Expression):
+                if getattr(declarations[name], "direction", None) is Direction.OUT:
+                    message = f"{node.skill}.{name} is an output: give it a variable, for example ${name}"
+                    yield make_error(value.span, "wrong-type", message)
             elif isinstance(value, Constant):
                 yield from _check_value(context, node, declarations[name], value)
                 yield from find_unknown_names(context, node.skill, declarations[name], value)
@@ -72,7 +85,10 @@ def _check_reference(
             yield make_error(reference.span, "wrong-type", message, f"Write ${reference.local_name}.")
     elif not declaration.accepts_variable or reference.name not in context.written_variables:
         message = f"{name} must be a constant, but ${reference.name} is neither a param nor an argument"
-        yield make_error(reference.span, "unknown-param", message, context.make_unknown_param_hint(reference))
+        hint = context.make_unknown_param_hint(reference)
+        if reference.name in context.written_variables:
+            hint = f"For the present value of the variable, write = {reference}."
+        yield make_error(reference.span, "unknown-param", message, hint)
 
 
 def _check_value(

@@ -2,28 +2,38 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Union, cast
 
 from executive.cell.objects import Item
 from executive.mission.analysis import CheckContext
+from executive.mission.check_expressions import ReadVariable, StaticValue, check_expression, make_static
 from executive.mission.check_skills import find_unknown_names
+from executive.mission.mission_file import MissionParam
 from executive.mission.ports import (
     Wire,
     describe_type,
     find_element_type,
     find_fields,
-    find_literals,
     find_problem,
     find_written_variables,
     is_assignable,
 )
 from executive.skill import Direction, Param, Port
 from executive.text.findings import Finding, Span, describe_value, make_error, make_warning, suggest_choice
-from executive.tree.keys import Key
+from executive.tree.keys import AnyValue, Key
 from executive.tree.node import ControlNode
-from executive.tree.specification import Constant, Node, Reference, SkillNode, SubtreeNode, Value
+from executive.tree.specification import (
+    Constant,
+    Expression,
+    Node,
+    Reference,
+    SkillNode,
+    SubtreeNode,
+    Value,
+)
 
 
 def find_unwritten_inputs(context: CheckContext) -> Iterator[Finding]:
@@ -73,10 +83,12 @@ def find_unread_variables(context: CheckContext) -> Iterator[Finding]:
     for node in context.tree.walk():
         for wire in context.wires[node, Direction.OUT]:
             # A control node that overwrites a param is an error, which the expansion reports.
+            is_declared = isinstance(wire.port, Key) and not _is_loop_wire(wire)
+            if is_declared and getattr(node, "declaration", None) is None:
+                continue
             if wire.is_explicit and wire.variable not in read_variables | set(context.mission.params):
                 message = f"{wire} writes ${wire.variable}, which no node reads"
-                is_loop_variable = isinstance(wire.port, Key)
-                hint = f"Write ${wire.variable} where a node needs the value." if is_loop_variable else ""
+                hint = f"Write ${wire.variable} where a node needs the value." if _is_loop_wire(wire) else ""
                 yield make_warning(wire.span, "unread", message, hint)
         if not isinstance(node, SubtreeNode):
             continue
@@ -90,12 +102,12 @@ def find_unread_variables(context: CheckContext) -> Iterator[Finding]:
 def find_overwritten_loop_variables(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for every loop variable that another node writes: the loop deletes it when it ends."""
     wires = context.list_wires(context.tree, Direction.OUT)
-    skill_wires = {wire.variable: wire for wire in wires if isinstance(wire.node, SkillNode)}
+    other_wires = {wire.variable: wire for wire in wires if not _is_loop_wire(wire)}
 
     def check_node_and_children(node: Node, loop_wires: Mapping[str, Wire]) -> Iterator[Finding]:
-        for wire in context.wires[node, Direction.OUT] if isinstance(node, ControlNode) else ():
-            if other := skill_wires.get(wire.variable, loop_wires.get(wire.variable)):
-                name = f"another {other}" if isinstance(other.node, ControlNode) else str(other)
+        for wire in filter(_is_loop_wire, context.wires[node, Direction.OUT]):
+            if other := other_wires.get(wire.variable, loop_wires.get(wire.variable)):
+                name = f"another {other}" if _is_loop_wire(other) else str(other)
                 place = other.span.describe_place(wire.span.source)
                 message = f"{wire} writes ${wire.variable}, and so does {name} in {place}"
                 yield make_error(wire.span, "shadowed-variable", message, "Rename the loop variable.")
@@ -104,6 +116,11 @@ def find_overwritten_loop_variables(context: CheckContext) -> Iterator[Finding]:
             yield from check_node_and_children(child, loop_wires)
 
     yield from check_node_and_children(context.tree, {})
+
+
+def _is_loop_wire(wire: Wire) -> bool:
+    """Return True if a loop writes its variable."""
+    return isinstance(wire.port, Key) and bool(wire.port.list_key)
 
 
 def find_unwritten_returns(context: CheckContext) -> Iterator[Finding]:
@@ -164,6 +181,7 @@ class Writer:
         type: Type of the written values.
         refers_to: Kind of the written names, for example `bin` or `item`; "" if the output writes no names.
         constants: Written constants; None if the values are unknown before the run.
+        declaration: Declaration of a variable that `set` writes; None for other writers.
     """
 
     name: str
@@ -171,6 +189,7 @@ class Writer:
     type: object
     refers_to: str
     constants: tuple[Constant, ...] | None = None
+    declaration: Param | None = None
 
     def describe(self, span: Span) -> str:
         """Return name and position of the writer, for a message at `span`."""
@@ -185,22 +204,29 @@ def check_port_types(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for every input that does not accept all possible values of its variable."""
     skill_writers: dict[str, list[Writer]] = {}
     for wire in context.list_wires(context.tree, Direction.OUT):
+        declared = getattr(wire.node, "declaration", None)
         if not isinstance(wire.port, Key):
             writer = Writer(str(wire), wire.node.span, wire.port.type, wire.port.refers_to)
             skill_writers.setdefault(wire.variable, []).append(writer)
+        elif isinstance(declared, MissionParam):
+            declaration = declared.declaration
+            writer = Writer("variables", wire.span, declaration.type, "", declaration=declaration)
+            skill_writers[wire.variable] = [*skill_writers.get(wire.variable, ()), writer]
 
     def check_node_and_children(node: Node, loop_writers: WritersByVariable) -> Iterator[Finding]:
         all_writers = {**skill_writers, **loop_writers}
+        yield from _check_expressions(context, node, all_writers)
         for wire in context.wires[node, Direction.IN]:
             writers = list(_select_field(all_writers.get(wire.variable, ()), wire.field))
             yield from _check_field(str(wire), wire.reference, all_writers.get(wire.variable, ()))
+            if wire.is_operand:
+                continue
             if isinstance(wire.port, Key):
                 yield from _check_lists(wire, writers)
                 continue
             for writer in writers:
                 yield from _check_connection(context, wire, wire.port, writer)
-                yield from _check_compared_constants(context, wire, wire.port, writer)
-        for wire in context.wires[node, Direction.OUT]:
+        for wire in filter(_is_loop_wire, context.wires[node, Direction.OUT]):
             if isinstance(node, ControlNode) and isinstance(wire.port, Key):
                 elements = node.settings.get(wire.port.list_key)
                 list_writers = _find_list_writers(node, elements, all_writers)
@@ -209,6 +235,70 @@ def check_port_types(context: CheckContext) -> Iterator[Finding]:
             yield from check_node_and_children(child, loop_writers)
 
     yield from check_node_and_children(context.tree, {})
+
+
+def _check_expressions(context: CheckContext, node: Node, writers: WritersByVariable) -> Iterator[Finding]:
+    """Yield the mistakes in the expressions of a node, and in a value that it assigns to a variable."""
+
+    def read(variable: str) -> list[StaticValue]:
+        return [_make_static(writer) for writer in writers.get(variable, ())]
+
+    if isinstance(node, SkillNode):
+        skill = context.skills.get(node.skill)
+        declarations: dict[str, Param | Port] = {**skill.params, **skill.ports} if skill else {}
+        for name, value in node.settings.items():
+            is_output = getattr(declarations.get(name), "direction", None) is Direction.OUT
+            if isinstance(value, Expression) and name in declarations and not is_output:
+                yield from check_expression(context, f"{node.skill}.{name}", declarations[name], value, read)
+        return
+    for wire in context.wires[node, Direction.OUT]:
+        if isinstance(wire.port, Key) and not _is_loop_wire(wire):
+            yield from _check_assignment(context, wire, writers, read)
+    for key, items in node.list_values() if isinstance(node, ControlNode) else ():
+        for item in items if isinstance(items, tuple) else (items,):
+            if isinstance(item, Expression) and key.value_type != AnyValue:
+                yield from check_expression(context, f"{node.type_name}.{key.name}", key, item, read)
+
+
+def _check_assignment(
+    context: CheckContext, wire: Wire, writers: WritersByVariable, read: ReadVariable
+) -> Iterator[Finding]:
+    """Yield an error if `set` names no declared variable, or its value does not fit the declaration."""
+    node = cast("ControlNode", wire.node)
+    name = wire.variable.rpartition(".")[2]
+    declared = [one for one in writers.get(wire.variable, ()) if one.declaration]
+    others = [one for one in writers.get(wire.variable, ()) if not one.declaration]
+    if getattr(node, "declaration", None) is not None:
+        for other in others:
+            message = f"{other.describe(wire.span)} writes ${name}, so `variables` cannot use this name"
+            yield make_error(wire.span, "shadowed-variable", message, "Rename the variable.")
+        return
+    if not declared:
+        names = [name for name, all_writers in writers.items() if all_writers[0].declaration]
+        hint = suggest_choice(name, names, "Variables") if names else "Declare it in variables: {NAME: 0}."
+        yield make_error(wire.span, "unknown-variable", f"the mission declares no variable {name}", hint)
+        return
+    declaration = cast("Param", declared[0].declaration)
+    value = node.settings.get("to")
+    if isinstance(value, Reference):
+        value = Expression("value", (value,), value.span)
+    if isinstance(value, Expression):
+        yield from check_expression(context, f"${name}", declaration, value, read)
+    elif isinstance(value, Constant) and (problem := find_problem(value.value, declaration)):
+        yield make_error(value.span, problem.code, f"${name} {problem}{value.origin_note}")
+
+
+def _make_static(writer: Writer) -> StaticValue:
+    """Return what is known about the values of a writer."""
+    if writer.declaration is not None:
+        return make_static(writer.declaration)
+    if writer.constants is None:
+        return StaticValue(writer.type, writer.refers_to)
+    values = [constant.value for constant in writer.constants]
+    types = tuple({type(value) for value in values})
+    numbers = [float(value) for value in values if isinstance(value, int | float)]
+    bounds = (min(numbers), max(numbers)) if len(numbers) == len(values) > 0 else (-math.inf, math.inf)
+    return StaticValue(Union[types] if types else Any, "", None, *bounds)  # noqa: UP007
 
 
 def _find_list_writers(node: Node, elements: Value | None, writers: WritersByVariable) -> list[Writer]:
@@ -274,8 +364,7 @@ def _select_field(writers: Iterable[Writer], field: str) -> Iterator[Writer]:
         if not field:
             yield writer
         elif found := find_fields(writer.type, writer.refers_to).get(field):
-            field_type, refers_to = found
-            yield replace(writer, type=field_type, refers_to=refers_to)
+            yield replace(writer, type=found.type, refers_to=found.refers_to)
 
 
 def _check_connection(
@@ -297,6 +386,9 @@ def _check_connection(
     if writer.constants is not None:
         return
     is_type_accepted = is_assignable(writer.type, port.type)
+    declared_choices = writer.declaration.choices if writer.declaration else None
+    if is_type_accepted and declared_choices and {*declared_choices} <= {*choices}:
+        return
     if is_type_accepted and (writer.refers_to == port.refers_to if port.refers_to else not choices):
         return
     is_any_text = is_type_accepted and not writer.refers_to
@@ -304,28 +396,6 @@ def _check_connection(
     message = f"{wire} takes {port_type}, but {wire.reference} holds {written_type}"
     hint = f"${wire.reference.local_name} is written by {writer.describe(wire.span)}."
     yield make_error(wire.span, "port-type", message, hint)
-
-
-def _check_compared_constants(
-    context: CheckContext, wire: Wire, port: Port | Param, writer: Writer
-) -> Iterator[Finding]:
-    """Yield an error for each constant that is compared with `port`, if `writer` can never write it."""
-    node = wire.node
-    if not isinstance(node, SkillNode) or writer.constants is not None:
-        return
-    for name, value in find_literals(node):
-        compared = context.skills[node.skill].ports.get(name)
-        # `check_settings` reports a constant of the wrong type.
-        if compared is None or compared.compared_with != port.name or find_problem(value.value, compared):
-            continue
-        # A field such as `$item.bin` is "" if it names no bin; `find_unknown_names` accepts the default.
-        expected = replace(compared, type=writer.type, refers_to=writer.refers_to, default="")
-        yield from find_unknown_names(context, node.skill, expected, value)
-        if not is_assignable(type(value.value), expected.type):
-            kind = describe_values(expected.type, expected.refers_to)
-            message = f"{wire.reference} is {kind} and never equals {describe_value(value.value)}"
-            hint = f"{node.skill} compares {wire.reference} with this constant."
-            yield make_error(value.span, "port-type", message, hint)
 
 
 def describe_values(declared_type: object, refers_to: str) -> str:

@@ -6,21 +6,24 @@ The checks and the tree builder get only the expanded tree, in which every refer
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import cast
 
 from executive.behaviours import Skills
-from executive.mission.mission_file import Mission, QuotaKey, Subtree
-from executive.mission.ports import find_node_wires, find_written_variables
+from executive.mission.grammar import SEQUENCE_KEYWORD, SET_KEYWORD
+from executive.mission.mission_file import Mission, MissionParam, QuotaKey, Subtree
+from executive.mission.ports import find_node_wires, find_written_variables, list_assignments
 from executive.skill import Direction
 from executive.text.findings import Finding, Span, find_similar_word, make_error, make_warning, suggest_choice
 from executive.tree.keys import Children, Elements, KeyOwner, KeySection, KeyValue, Part, map_parts
-from executive.tree.node import ControlNode
+from executive.tree.node import ControlNode, load_control_nodes
 from executive.tree.specification import (
     Constant,
+    Expression,
     InvalidNode,
     InvalidValue,
+    LocatedName,
     Node,
     Reference,
     SkillNode,
@@ -66,7 +69,8 @@ def expand(mission: Mission, skills: Skills, predefined_lists: PredefinedLists) 
     """
     expander = _Expander(mission, skills, predefined_lists)
     quotas = {key: expander.expand_value(limit) for key, limit in mission.quotas.items()}
-    tree = None if mission.tree is None else expander.expand_tree(mission.tree, expander.params)
+    root = mission.tree and initialize_variables(mission.tree, mission.variables)
+    tree = None if root is None else expander.expand_tree(root, expander.params)
     unused_subtrees = []
     subtree_nodes = [node for subtree in mission.subtrees.values() for node in subtree.body.walk()]
     names_used_in_subtrees = {node.name for node in subtree_nodes if isinstance(node, SubtreeNode)}
@@ -180,14 +184,18 @@ class _Expander:
     def _resolve_name(self, reference: Reference, values: ValuesByName, callers: tuple[str, ...]) -> Value:
         """Return the value of a param or argument, or the reference itself if it is a variable."""
         value = values.get(reference.name)
+        if reference.name.startswith("."):
+            return reference  # A candidate, which only its expression knows.
         # A misspelt reference counts as a reference to the param or argument with the most similar name.
         name = reference.name if value is not None else find_similar_word(reference.name, values)
         is_argument = bool(callers) and name in self.mission.subtrees[callers[-1]].arguments
         self._referenced_names.add((callers[-1] if is_argument else "", name or ""))
         if value is None or isinstance(value, InvalidValue):
             return value or reference
-        if reference.field and (isinstance(value, Constant) or value.field):
-            text = "a constant"
+        if reference.field == "count" and isinstance(value, Constant) and isinstance(value.value, list):
+            return replace(value, value=len(value.value), origin=f"{reference} ")
+        if reference.field and not (isinstance(value, Reference) and not value.field):
+            text = "a constant" if isinstance(value, Constant) else "an expression"
             if isinstance(value, Reference):
                 text = f"the field {value}".replace(_CALLER_PREFIX, "")
             message = f"${reference.name} is {text}, which has no field {reference.field}"
@@ -195,6 +203,8 @@ class _Expander:
             return InvalidValue(reference.span)
         if isinstance(value, Reference):
             return replace(value, field=reference.field or value.field)
+        if isinstance(value, Expression):
+            return value
         # A finding about the value is located at the value, so the message must contain the reference.
         origin = f"${reference.name} in {reference.span.describe_place(value.span.source)}"
         return replace(value, origin=origin, reference_span=reference.span)
@@ -219,26 +229,31 @@ class _Expander:
         self._outermost_span = self._outermost_span if callers else use.span
         # A library must not depend on the params of a mission.
         params: ValuesByName = {} if subtree.library else self.params
+        arguments = {name: _prefix_variables(value) for name, value in arguments.items()}
+        body = initialize_variables(subtree.body, subtree.variables)
+        body = self._expand_node(body, {**params, **arguments}, (*callers, use.name), depth + 1)
+        local_names = set(map(str, subtree.variables))
         if subtree.returns is not None:
-            arguments = {name: _prefix_variable(value) for name, value in arguments.items()}
-        body = self._expand_node(subtree.body, {**params, **arguments}, (*callers, use.name), depth + 1)
-        if subtree.returns is None:
-            return use.replace(body=body)
-        body = self._rename_variables(use, body, returns)
+            assigned = {wire.variable for wire in list_assignments(body, self.skills)}
+            local_names |= find_written_variables(body, self.skills) - (
+                assigned & self.mission.variables.keys()
+            )
+        body = self._rename_variables(use, body, returns, local_names)
         return use.replace(body=body, written_variables=tuple(returns.values()))
 
-    def _rename_variables(self, use: SubtreeNode, body: Node, returns: Mapping[str, str]) -> Node:
+    def _rename_variables(
+        self, use: SubtreeNode, body: Node, returns: Mapping[str, str], local_names: Collection[str]
+    ) -> Node:
         """Return the body; local variables get unique names, returned variables get the caller's names."""
         use_number = self._use_counts[use.name]
         prefix = f"{use.name}." if use_number == 1 else f"{use.name}-{use_number}."
-        written_variables = find_written_variables(body, self.skills)
 
         def rename(name: str) -> str:
             if name.startswith(_CALLER_PREFIX):
                 return name.removeprefix(_CALLER_PREFIX)
             if name in returns:
                 return returns[name]
-            return prefix + name if name in written_variables else name
+            return prefix + name if name in local_names else name
 
         def rename_part(part: Part) -> Part:
             if isinstance(part, Reference):
@@ -293,8 +308,28 @@ class _Expander:
         self.findings.append(make_error(span, code, message, hint))
 
 
-def _prefix_variable(value: Value) -> Value:
+def _prefix_variables(value: Value) -> Value:
+    """Return a value with the prefix of the caller's variables in all references."""
+    if isinstance(value, Expression):
+        return replace(value, operands=tuple(map(_prefix_variables, value.operands)))
     return replace(value, name=_CALLER_PREFIX + value.name) if isinstance(value, Reference) else value
+
+
+def initialize_variables(body: Node, variables: Mapping[LocatedName, MissionParam]) -> Node:
+    """Return a tree that gives variables their initial values before it runs."""
+    if not variables:
+        return body
+    node_classes = load_control_nodes()
+    nodes = [
+        node_classes[SET_KEYWORD].make(
+            {"to": variable.value},
+            span=name.span,
+            set=VariableName(name, span=name.span),
+            declaration=variable,
+        )
+        for name, variable in variables.items()
+    ]
+    return node_classes[SEQUENCE_KEYWORD].make({}, span=body.span, do=(*nodes, body), is_list=True)
 
 
 def assign_paths(node: Node, parent_path: str = "", key_path: str = "tree", name: str = "") -> Node:

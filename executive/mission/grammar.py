@@ -16,7 +16,17 @@ from pydantic.fields import FieldInfo
 
 from executive.text.findings import Finding, Span, make_error, suggest_choice
 from executive.text.yaml_files import YamlMapping, YamlNode, YamlScalar, YamlSequence, list_scalars
-from executive.tree.specification import Child, Constant, InvalidValue, LocatedName, Reason, Reference, Value
+from executive.tree.expression import MARK, read_expression
+from executive.tree.specification import (
+    Child,
+    Constant,
+    Expression,
+    InvalidValue,
+    LocatedName,
+    Reason,
+    Reference,
+    Value,
+)
 
 NAME_EXPRESSION = "[A-Za-z_][A-Za-z0-9_]*"
 """Regular expression of the names of params, arguments, variables and subtrees."""
@@ -24,6 +34,10 @@ LABEL_EXPRESSION = "[a-z_][a-z0-9_]*"
 """Regular expression that every label matches."""
 SEQUENCE_KEYWORD = "sequence"
 """Keyword that is assumed if a node is written as a plain list."""
+SET_KEYWORD = "set"
+"""Keyword of a node that gives a variable a new value."""
+CONDITION_KEYWORD = "holds"
+"""Keyword that is assumed if a condition is written as an expression."""
 USE_KEYWORD = "use"
 """Keyword of a node that uses a subtree."""
 BEHAVIOUR_KEYWORD = "PyTree"
@@ -31,7 +45,7 @@ BEHAVIOUR_KEYWORD = "PyTree"
 BEHAVIOUR_CLASS = "class"
 """Key below `PyTree` for the import path of the behaviour; all other keys are its arguments and ports."""
 KEYWORD_HINTS: Mapping[str, str] = {
-    "then": "Write nodes that run in sequence as a list.",
+    "then": "Write nodes that run in sequence as a list; `then` is a key below `if`.",
     "do": 'Only control nodes have the key "do"; write the node without "do".',
     "with": 'Write "with" next to "use", with the same indentation.',
     "returns": 'Write "returns" next to "use", with the same indentation.',
@@ -115,6 +129,15 @@ class ParamKeys(FileKeys):
     """Meaning of the param, one sentence."""
 
 
+class VariableKeys(ParamKeys):
+    """Keys of a variable that `set` changes; a value without keys is the initial value."""
+
+    default: object = None
+    """Initial value."""
+    unit: Literal["s", "m", "m/s", "N"] = "s"
+    """Unit of a number: s, m, m/s or N."""
+
+
 class SubtreeKeys(FileKeys):
     """Keys of a subtree; a node without these keys is a subtree without arguments."""
 
@@ -124,6 +147,8 @@ class SubtreeKeys(FileKeys):
     """Arguments of the subtree: a list of names, or names with defaults."""
     returns: DollarName | list[DollarName] = []
     """Variables that the caller gets; all other variables are then local."""
+    variables: dict[Name, VariableKeys] | None = None
+    """Local variables with their initial values, which `set` changes."""
     do: Child
     """Root node of the subtree."""
 
@@ -152,6 +177,8 @@ class MissionKeys(FileKeys):
     """Library files: paths relative to this or the shipped folder."""
     params: dict[Name, ParamKeys] | None = None
     """Constants, read as `$name`; `--set name=value` replaces a value."""
+    variables: dict[Name, VariableKeys] | None = None
+    """Variables with their initial values, read as `$name`; `set` changes a value."""
     routes: dict[str, Files] | None = None
     """Bin, or list of permitted bins, for each class of objects."""
     quotas: dict[str, Limit | Annotated[dict[str, Limit], Field(min_length=1)]] | None = None
@@ -224,26 +251,27 @@ class MappingReader:
         self.add_error(node.span, "wrong-type", message)
         return ""
 
-    def read_reasons(self, key: str, section_keys: Sequence[str] = ()) -> tuple[Reason, ...]:
+    def read_reasons(self, key: str, *, accepts_expressions: bool) -> tuple[Reason | Expression, ...]:
         """Return the failure names in the list or single value of `key`; add an error for invalid items.
 
-        If the value may also contain sections with keys `section_keys`, mappings are ignored.
+        If the value may also contain expressions, these begin with `=`.
         """
         node = self.get(key)
-        names = []
+        names: list[Reason | Expression] = []
         if isinstance(node, YamlSequence) and not node.items:
             hint = f'To match every failure, delete "{key}".'
             self.add_error(node.span, "empty-list", f"{self._describe_key(key)} names no failure", hint)
         for item in self.list_items(key):
             text = item.text if isinstance(item, YamlScalar) else ""
-            if section_keys and isinstance(item, YamlMapping):
-                continue
-            if match := _FAILURE_PATTERN.fullmatch(text):
+            if accepts_expressions and text.startswith(MARK):
+                expression = read_expression(text, item.span, self.findings)
+                names += [expression] if isinstance(expression, Expression) else []
+            elif match := _FAILURE_PATTERN.fullmatch(text):
                 names.append(Reason(match[1], match[2], span=item.span))
             else:
                 rule = f"{self._describe_key(key)} must name failures as Skill.reason or label.reason"
-                if section_keys:
-                    rule += f", or be a mapping with {' or '.join(section_keys)}"
+                if accepts_expressions:
+                    rule += ", or be an expression such as = run.placed >= 4"
                 message = f'{rule}, not "{text}"' if text else f"{rule}, not {item.description}"
                 self.add_error(item.span, "bad-match", message)
         return tuple(names)
@@ -286,9 +314,16 @@ def is_empty(node: YamlNode) -> bool:
 
 
 def read_settings(
-    node: YamlNode | None, owner: str, findings: list[Finding], example_key: str = "name"
+    node: YamlNode | None,
+    owner: str,
+    findings: list[Finding],
+    example_key: str = "name",
+    expression_keys: Sequence[str] = (),
 ) -> dict[LocatedName, Value]:
-    """Return the settings below `owner`, a skill or a key; the hint of an error shows `example_key`."""
+    """Return the settings below `owner`, a skill or a key; the hint of an error shows `example_key`.
+
+    The values of `expression_keys` are expressions, also without `=`.
+    """
     if node is None or is_empty(node):
         return {}
     if not isinstance(node, YamlMapping):
@@ -296,13 +331,22 @@ def read_settings(
         hint = f"Write {owner}: {{{example_key}: {node.text}}}." if isinstance(node, YamlScalar) else ""
         findings.append(make_error(node.span, "wrong-type", message, hint))
         return {}
-    entries = node.entries.items()
-    return {LocatedName(key, entry.key.span): read_value(entry.value, findings) for key, entry in entries}
+    return {
+        LocatedName(key, entry.key.span): read_expression(entry.value.text, entry.value.span, findings)
+        if key in expression_keys and isinstance(entry.value, YamlScalar)
+        else read_value(entry.value, findings)
+        for key, entry in node.entries.items()
+    }
 
 
 def read_value(node: YamlNode, findings: list[Finding]) -> Value:
-    """Return a reference for `$name` or `$name.field`; otherwise a constant, with `$` in place of `$$`."""
+    """Return a reference for `$name` or `$name.field`, an expression after `=`, or else a constant.
+
+    In a constant, `$` replaces each `$$`.
+    """
     text = node.value if isinstance(node, YamlScalar) else None
+    if isinstance(text, str) and text.startswith(MARK):
+        return read_expression(text, node.span, findings)
     if isinstance(text, str) and (match := REFERENCE_PATTERN.fullmatch(text)):
         return Reference(match[1], node.span, match[2] or "")
     errors = list(_find_misplaced_dollars(node))

@@ -34,7 +34,15 @@ from executive.text.findings import Finding, MissionError, Source, make_warning,
 from executive.text.yaml_files import parse_yaml
 from executive.tree.blackboard import Blackboard, NodeContext, Wiring
 from executive.tree.node import ControlNode, load_control_nodes
-from executive.tree.specification import Constant, InvalidNode, LocatedName, Node, SkillNode, SubtreeNode
+from executive.tree.specification import (
+    Constant,
+    Expression,
+    InvalidNode,
+    LocatedName,
+    Node,
+    SkillNode,
+    SubtreeNode,
+)
 from executive.tree.tree_node import SkillLeaf, TreeNode
 
 Check = Callable[[CheckContext], Iterator[Finding]]
@@ -370,12 +378,14 @@ class TreeBuilder:
         skill = self.skills[node.skill]
         declarations: Mapping[str, Param | Port] = {**skill.params, **skill.ports}
         literals = find_literals(node)
-        input_wires = list(find_wires(node, skill, Direction.IN))
+        input_wires = [wire for wire in find_wires(node, skill, Direction.IN) if not wire.is_operand]
+        settings = node.settings.items()
         wiring = Wiring(
             constants={name: convert_setting(one.value, declarations[name]) for name, one in literals},
             inputs={wire.port.name: wire.variable for wire in input_wires},
             fields={wire.port.name: wire.field for wire in input_wires if wire.field},
             outputs={wire.port.name: wire.variable for wire in find_wires(node, skill, Direction.OUT)},
+            expressions={str(name): value for name, value in settings if isinstance(value, Expression)},
         )
         patterns = (pattern for pattern in self.substitutes if fnmatchcase(node.path, pattern))
         executed_skill = next((self.substitutes[pattern] for pattern in patterns), skill)

@@ -16,6 +16,7 @@ from executive.mission.grammar import (
     MissionKeys,
     ParamKeys,
     SubtreeKeys,
+    VariableKeys,
     is_empty,
     make_literal,
     read_settings,
@@ -26,8 +27,16 @@ from executive.mission.ports import ValueProblem, convert_setting, convert_value
 from executive.skill import Param, param
 from executive.text.findings import suggest_choice
 from executive.text.validate import CELL_PREFIX, make_override_source, parse_override
-from executive.text.yaml_files import YamlMapping, YamlNode, YamlScalar, YamlSequence
-from executive.tree.specification import Constant, InvalidValue, LocatedName, Node, Value
+from executive.text.yaml_files import YamlEntry, YamlMapping, YamlNode, YamlScalar, YamlSequence
+from executive.tree.specification import (
+    Constant,
+    Expression,
+    InvalidValue,
+    LocatedName,
+    Node,
+    Reference,
+    Value,
+)
 
 
 @dataclass(frozen=True)
@@ -39,6 +48,7 @@ class Subtree:
         arguments: Defaults of the arguments by name; None for a mandatory argument.
         returns: Variables that are not local; None: no variable is local.
         body: Root node of the subtree.
+        variables: Local variables with their initial values.
         library: Name of the library that defines the subtree; "" if the mission file defines it.
     """
 
@@ -47,15 +57,17 @@ class Subtree:
     arguments: Mapping[LocatedName, Value | None]
     returns: tuple[LocatedName, ...] | None
     body: Node
+    variables: Mapping[LocatedName, MissionParam] = field(default_factory=dict)
     library: str = ""
 
 
 @dataclass(frozen=True)
 class MissionParam:
-    """A constant of the mission.
+    """A constant of the mission, or a variable that `set` changes.
 
     Attributes:
-        value: Value in this run: the value of `--set`, otherwise the default; or an invalid value.
+        value: Value in this run: the value of `--set`, otherwise the default; or an invalid value. Of a
+            variable, the initial value.
         declaration: Type, bounds and choices; the type is `Any` if it is unknown.
     """
 
@@ -78,6 +90,7 @@ class Mission:
         params: Constants by name, with the values of `--set`.
         routes: Bins that may receive the objects of a class, by class.
         quotas: Maximum numbers of objects in a bin, of one class or of all.
+        variables: Variables of the mission with their initial values.
         tree: Root node of the tree; None if the key is missing.
         subtrees: Subtrees of the mission and of its libraries, by name.
         is_complete: False if a library could not be read, so that `subtrees` may lack subtrees.
@@ -90,11 +103,14 @@ class Mission:
     params: Mapping[LocatedName, MissionParam] = field(default_factory=dict)
     routes: Mapping[LocatedName, tuple[LocatedName, ...]] = field(default_factory=dict)
     quotas: Mapping[QuotaKey, Value] = field(default_factory=dict)
+    variables: Mapping[LocatedName, MissionParam] = field(default_factory=dict)
     tree: Node | None = None
     subtrees: Mapping[str, Subtree] = field(default_factory=dict)
     is_complete: bool = True
 
 
+UNITS = ("s", "m", "m/s", "N")
+"""Units of variables."""
 PARAM_TYPES = {"text": str, "integer": int, "number": float, "boolean": bool, "list": list[Any]}
 """Python types of params, by their names in a mission."""
 
@@ -126,9 +142,35 @@ def parse_params(reader: MappingReader, overrides: Mapping[str, str]) -> dict[Lo
     return params
 
 
+def parse_variables(reader: MappingReader) -> dict[LocatedName, MissionParam]:
+    """Return the variables below `variables` by name, with their initial values."""
+    variables: dict[LocatedName, MissionParam] = {}
+    for name, node in reader.iterate_entries("variables"):
+        reader.check_name(name, "a variable")
+        keys = VariableKeys.get_keys()
+        if not isinstance(node, YamlMapping):
+            node = YamlMapping(
+                node.span, {"default": YamlEntry(YamlScalar(name.span, "default", "default"), node)}
+            )
+        declaration_reader = MappingReader(f'the variable "{name}"', name.span, node, keys, reader.findings)
+        variable = _read_declaration(name, declaration_reader, is_overridden=False)
+        unit = declaration_reader.read_text("unit")
+        if unit not in ("", *UNITS):
+            hint = suggest_choice(unit, UNITS, "Units")
+            message = f'there is no unit "{unit}"'
+            reader.add_error(declaration_reader.get_value_span("unit"), "wrong-value", message, hint)
+        variables[name] = replace(variable, declaration=replace(variable.declaration, unit=unit))
+    return variables
+
+
 def _read_declaration(name: str, reader: MappingReader, is_overridden: bool) -> MissionParam:
     """Return the param that a mapping with keys such as `default` and `min` declares."""
     default = reader.get("default")
+    value = None if default is None else read_value(default, reader.findings)
+    if isinstance(value, Reference | Expression):
+        message = f"the default of {reader.owner} must be a constant"
+        reader.add_error(value.span, "wrong-type", message, "For a text that begins so, write $$.")
+        value = InvalidValue(value.span)
     items = reader.list_items("choices")
     reader.read_text("doc")
     declaration = param(
@@ -141,7 +183,7 @@ def _read_declaration(name: str, reader: MappingReader, is_overridden: bool) -> 
         hint = suggest_choice(type_name, PARAM_TYPES, "Types")
         message = f'there is no type "{type_name}"'
         reader.add_error(reader.get_value_span("type"), "wrong-value", message, hint)
-    default_type = _infer_type(None if default is None else default.python_value)
+    default_type = _infer_type(value.value if isinstance(value, Constant) else None)
     declaration = replace(declaration, type=PARAM_TYPES.get(type_name, default_type))
     without_value = MissionParam(InvalidValue(reader.span), declaration)
     problem = f"{name} cannot have any value"
@@ -150,11 +192,12 @@ def _read_declaration(name: str, reader: MappingReader, is_overridden: bool) -> 
     elif declaration.ge is not None and declaration.le is not None and declaration.ge > declaration.le:
         problem = f"{problem}: min {declaration.ge:g} is greater than max {declaration.le:g}"
         reader.add_error(reader.get_value_span("min"), "out-of-range", problem)
-    elif default is not None:
-        return _replace_value(name, without_value, make_literal(default), reader)
-    elif not is_overridden:
-        message = f'the param "{name}" has neither a default nor a value'
-        reader.add_error(reader.span, "missing-param", message, f"Set it with --set {name}=...")
+    elif isinstance(value, Constant):
+        return _replace_value(name, without_value, value, reader)
+    elif default is None and not is_overridden:
+        message = f"{reader.owner} has neither a default nor a value"
+        hint = f"Set it with --set {name}=..." if reader.owner.startswith("the param") else ""
+        reader.add_error(reader.span, "missing-param", message, hint)
     return without_value
 
 
@@ -203,6 +246,7 @@ def parse_mission(root: YamlNode, overrides: Mapping[str, str], parser: NodePars
         params=parse_params(reader, overrides),
         routes=_read_routes(reader),
         quotas=_read_quotas(reader),
+        variables=parse_variables(reader),
         tree=None if tree is None else parser.read_node(tree, reader.get_key_span("tree")),
         subtrees=_read_subtrees(reader, parser),
     )
@@ -274,7 +318,8 @@ def _read_subtrees(reader: MappingReader, parser: NodeParser, library: str = "")
         if isinstance(node, YamlMapping) and SubtreeKeys.get_keys().keys() & node.entries.keys():
             subtrees[name] = _parse_subtree(name, node, parser, library)
         else:
-            subtrees[name] = Subtree(name, "", {}, None, parser.read_node(node, name.span), library)
+            body = parser.read_node(node, name.span)
+            subtrees[name] = Subtree(name, "", {}, None, body, library=library)
     return subtrees
 
 
@@ -291,6 +336,7 @@ def _parse_subtree(name: LocatedName, node: YamlMapping, parser: NodeParser, lib
         arguments=_read_arguments(reader),
         returns=_read_returns(reader),
         body=parser.read_node(reader.get("do"), reader.get_key_span("do")),
+        variables=parse_variables(reader),
         library=library,
     )
 

@@ -13,11 +13,22 @@ from executive.mission.grammar import NAME_PATTERN, MappingReader, is_empty, rea
 from executive.skill import Skill
 from executive.text.findings import Finding, Span, make_error, suggest_choice
 from executive.text.yaml_files import YamlEntry, YamlMapping, YamlNode, YamlScalar, YamlSequence
-from executive.tree.keys import Children, Key, KeyOwner, KeySection, KeyValue, OwnerT, list_nodes
+from executive.tree.expression import read_expression, read_template
+from executive.tree.keys import (
+    Children,
+    Key,
+    KeyOwner,
+    KeySection,
+    KeyValue,
+    OwnerT,
+    list_member_types,
+    list_nodes,
+)
 from executive.tree.node import ControlNode, ControlNodes
 from executive.tree.specification import (
     Child,
     Constant,
+    Expression,
     InvalidNode,
     InvalidValue,
     LocatedName,
@@ -31,6 +42,8 @@ from executive.tree.specification import (
 
 _SKILL_PATTERN = re.compile(r"[A-Z][A-Za-z0-9]*")
 """Matches the names of skills, also of skills that are not installed."""
+EXPRESSION_PATTERN = re.compile(r"[$<>=+*/%(]|^(run|bin|not)\b")
+"""Matches in a condition that is an expression, and in no name of a skill or control node."""
 
 
 class NodeParser:
@@ -96,6 +109,10 @@ class NodeParser:
             self.add_error(scalar.span, "missing-node", f'"{word}" needs a body: write {word}: ...')
         elif isinstance(scalar.value, str) and _SKILL_PATTERN.fullmatch(word):
             return SkillNode.model_construct(span=scalar.span, skill=word, settings={})
+        elif isinstance(scalar.value, str) and EXPRESSION_PATTERN.search(word):
+            condition = self._node_classes[grammar.CONDITION_KEYWORD]
+            value = read_expression(word, scalar.span, self.findings)
+            return condition.make({grammar.CONDITION_KEYWORD: value}, span=scalar.span)
         else:
             self._add_keyword_error(scalar.span, word)
         return InvalidNode(span=scalar.span)
@@ -154,7 +171,11 @@ class NodeParser:
         if name in self._node_classes:
             return self._read_control_node(mapping, entry, label, self._node_classes[name])
         params = self._skills[name].params if name in self._skills else {}
-        settings = read_settings(entry.value, name, self.findings, next(iter(params), "name"))
+        rules = [param.name for param in params.values() if param.candidate]
+        settings = read_settings(entry.value, name, self.findings, next(iter(params), "name"), rules)
+        for rule in rules:
+            if isinstance(value := settings.get(LocatedName(rule)), Expression):
+                settings[LocatedName(rule)] = value.mark_candidate(params[rule].candidate)
         return SkillNode.model_construct(span=entry.key.span, label=label, skill=name, settings=settings)
 
     def _read_use(self, mapping: YamlMapping, entry: YamlEntry, label: str) -> Node:
@@ -291,6 +312,8 @@ class NodeParser:
     def _read_value(self, reader: MappingReader, key: Key, yaml_node: YamlNode) -> KeyValue | None:
         """Return the value of a key, or None after an error and for an omitted optional child."""
         span = reader.get_key_span(key.name)
+        if key.value_type == Expression:
+            return self._read_expression(key, yaml_node)
         if key.is_plain:
             return read_value(yaml_node, self.findings)
         if key.value_type == Child:
@@ -307,14 +330,20 @@ class NodeParser:
             return self._read_variable(reader, key.name)
         section = key.section
         if section is None:
-            return reader.read_reasons(key.name)
+            accepts_expressions = Expression in list_member_types(key.value_type)
+            return reader.read_reasons(key.name, accepts_expressions=accepts_expressions)
         if key.value_type is section:
             return self._read_section(key.name, section, yaml_node, span)
-        if key.has_reasons:
-            names = reader.read_reasons(key.name, tuple(section.keys))
-            mappings = [item for item in reader.list_items(key.name) if isinstance(item, YamlMapping)]
-            return *names, *(self._read_section(key.name, section, item, item.span) for item in mappings)
         return tuple(self._read_sections(key.name, section, yaml_node))
+
+    def _read_expression(self, key: Key, yaml_node: YamlNode) -> Value:
+        """Return the expression of a key, or of a text with expressions in braces."""
+        if not isinstance(yaml_node, YamlScalar) or yaml_node.value is None:
+            message = f"{key.name} must be an expression, not {yaml_node.description}"
+            self.add_error(yaml_node.span, "wrong-type", message)
+            return InvalidValue(yaml_node.span)
+        read = read_template if key.is_template else read_expression
+        return read(yaml_node.text, yaml_node.span, self.findings)
 
     def _read_variable(self, reader: MappingReader, key: str) -> VariableName | None:
         """Return the output variable of a key; for `$name`, add an error and return the variable `name`."""

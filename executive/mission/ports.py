@@ -7,7 +7,7 @@ import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, is_dataclass
-from typing import Any, NoReturn, Union, cast, get_args, get_origin, get_type_hints
+from typing import Any, NamedTuple, NoReturn, Union, cast, get_args, get_origin, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -15,9 +15,17 @@ from executive.behaviours import Skills, find_mission_type
 from executive.cell.objects import KnownItem, RefersTo
 from executive.skill import Direction, Param, Port, Skill
 from executive.text.findings import Span, describe_validation_error, describe_value, suggest_word
-from executive.tree.keys import Elements, Key, is_union
+from executive.tree.keys import AnyValue, Elements, Key, is_union
 from executive.tree.node import ControlNode
-from executive.tree.specification import Constant, LocatedName, Node, Reference, SkillNode, VariableName
+from executive.tree.specification import (
+    Constant,
+    Expression,
+    LocatedName,
+    Node,
+    Reference,
+    SkillNode,
+    VariableName,
+)
 
 _DESCRIPTIONS = {
     str: "a text",
@@ -55,19 +63,39 @@ def find_element_type(declared_type: object) -> object:
     return Union[tuple(arguments)] if arguments else Any  # noqa: UP007 - the number of types varies
 
 
-def find_fields(declared_type: object, refers_to: str) -> dict[str, tuple[object, str]]:
-    """Return type and kind of names of each field of the values of a type, by name.
+class Field(NamedTuple):
+    """A field of the values of a type.
 
-    The kind is "" for a field without names. An item has the fields of `KnownItem`.
+    Attributes:
+        type: Type of the field.
+        refers_to: Kind of the names that the field contains, or "".
+        unit: Unit of a number, or "".
+    """
+
+    type: object
+    refers_to: str = ""
+    unit: str = ""
+
+
+def find_fields(declared_type: object, refers_to: str) -> dict[str, Field]:
+    """Return the fields of the values of a type by name, which `Scope.read_field` reads.
+
+    An item has the fields of `KnownItem`. A value with a `position` also has `x`, `y` and `z`, one with a
+    `stamp` also its `age`, and a list its `count`.
     """
     value_type = KnownItem if refers_to == "item" and declared_type is str else declared_type
     if not (isinstance(value_type, type) and is_dataclass(value_type)):
-        return {}
+        is_list = value_type is not Any and find_element_type(value_type) is not None
+        return {"count": Field(int)} if is_list else {}
     hints = get_type_hints(value_type)
     annotations = get_type_hints(value_type, include_extras=True)
-    return {
-        field.name: (hints[field.name], _find_kind(annotations[field.name])) for field in fields(value_type)
+    declared = {
+        field.name: Field(hints[field.name], _find_kind(annotations[field.name]))
+        for field in fields(value_type)
     }
+    coordinates = dict.fromkeys("xyz", Field(float, "", "m")) if "position" in declared else {}
+    stamps = {"stamp": Field(float, "", "s"), "age": Field(float, "", "s")} if "stamp" in declared else {}
+    return {**declared, **coordinates, **stamps}
 
 
 def _find_kind(annotation: object) -> str:
@@ -199,6 +227,7 @@ class Wire:
         span: Position of the variable, or of the skill if the mission does not name the variable.
         is_explicit: True if the mission names the variable; otherwise, the variable has the port's name.
         field: Field of the variable that an input reads; "" for the whole value.
+        is_operand: True if an expression reads the variable, whose value is then not the value of the port.
     """
 
     node: Node
@@ -207,6 +236,7 @@ class Wire:
     span: Span
     is_explicit: bool
     field: str = ""
+    is_operand: bool = False
 
     @property
     def reference(self) -> Reference:
@@ -216,7 +246,7 @@ class Wire:
     @property
     def is_required(self) -> bool:
         """True for an input of a skill that has no default."""
-        return not isinstance(self.port, Key) and self.port.is_required
+        return self.is_operand or (not isinstance(self.port, Key) and self.port.is_required)
 
     @property
     def rename_hint(self) -> str:
@@ -229,6 +259,21 @@ class Wire:
         return name if isinstance(self.port, Key) else f"{name}.{self.port.name}"
 
 
+def list_assignments(root: Node, skills: Skills) -> Sequence[Wire]:
+    """Return the connections of the nodes of a tree that assign a value to a declared variable."""
+    wires = [wire for node in root.walk() for wire in find_node_wires(node, skills, Direction.OUT)]
+    return [wire for wire in wires if isinstance(wire.port, Key) and not wire.port.list_key]
+
+
+def _find_operand_wires(node: Node, port: Param | Port | Key, value: object) -> list[Wire]:
+    """Return the variables that an expression of a port or key reads, except the candidate."""
+    return [
+        Wire(node, port, operand.name, operand.span, True, operand.field, is_operand=True)
+        for operand in (value.walk() if isinstance(value, Expression) else ())
+        if isinstance(operand, Reference) and not operand.name.startswith(".")
+    ]
+
+
 def find_wires(node: SkillNode, skill: type[Skill], direction: Direction) -> Sequence[Wire]:
     """Return the connection of every port of a direction, except inputs with a constant.
 
@@ -237,11 +282,15 @@ def find_wires(node: SkillNode, skill: type[Skill], direction: Direction) -> Seq
     """
     params = skill.params.values() if direction is Direction.IN else ()
     ports = [port for port in skill.ports.values() if port.direction is direction]
-    declarations: list[Param | Port] = [*(param for param in params if param.accepts_variable), *ports]
+    declarations: list[Param | Port] = [*params, *ports]
     wires: list[Wire] = []
     for declaration in declarations:
         value = node.settings.get(LocatedName(declaration.name))
-        if isinstance(value, Reference):
+        if isinstance(value, Expression):
+            wires += _find_operand_wires(node, declaration, value)
+        elif isinstance(declaration, Param) and not declaration.accepts_variable:
+            continue
+        elif isinstance(value, Reference):
             wires.append(Wire(node, declaration, value.name, value.span, True, value.field))
         # `check_settings` reports a constant for an output.
         elif isinstance(declaration, Port) and (
@@ -261,8 +310,16 @@ def find_node_wires(node: Node, skills: Skills, direction: Direction) -> Sequenc
     for key, value in node.list_values() if isinstance(node, ControlNode) else ():
         if direction is Direction.OUT and isinstance(value, VariableName):
             wires.append(Wire(node, key, value, value.span, is_explicit=True))
-        elif direction is Direction.IN and key.value_type == Elements and isinstance(value, Reference):
-            wires.append(Wire(node, key, value.name, value.span, True, value.field))
+        elif (
+            direction is Direction.IN
+            and key.value_type in (Elements, AnyValue)
+            and isinstance(value, Reference)
+        ):
+            is_operand = key.value_type is AnyValue
+            wires.append(Wire(node, key, value.name, value.span, True, value.field, is_operand))
+        elif direction is Direction.IN:
+            for item in value if isinstance(value, tuple) else (value,):
+                wires += _find_operand_wires(node, key, item)
     return wires
 
 

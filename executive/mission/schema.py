@@ -20,10 +20,12 @@ from executive.cell.arm_config import ArmFile
 from executive.cell.config import CellConfig
 from executive.mission import grammar
 from executive.mission.grammar import BehaviourKeys, FileKeys, LibraryKeys, MissionKeys, NodeKeys, UseKeys
+from executive.mission.node_parser import EXPRESSION_PATTERN
 from executive.mission.ports import is_plain_type
 from executive.skill import Direction, Param, Port, Skill
-from executive.tree.keys import Children, Elements, Key, KeyOwner, list_member_types
+from executive.tree.keys import AnyValue, Children, Elements, Key, KeyOwner, list_member_types
 from executive.tree.node import ControlNode, ControlNodes
+from executive.tree.specification import Expression
 
 Schema: TypeAlias = JsonSchemaValue
 """A JSON Schema or a subschema."""
@@ -33,6 +35,9 @@ NO_ITEM_SUGGESTION: Schema = {"allOf": [True]}
 
 REFERENCE: Schema = {"$ref": "#/definitions/reference"}
 """Schema of a reference `$name`."""
+
+EXPRESSION: Schema = {"$ref": "#/definitions/expression"}
+"""Schema of an expression after `=`."""
 
 DIALECT = "http://json-schema.org/draft-07/schema#"
 """Value of `$schema` for draft-07."""
@@ -165,6 +170,8 @@ def _document_skill(skill: type[Skill]) -> Schema:
 
 
 def _make_param_schema(param: Param) -> Schema:
+    if param.candidate:
+        return {"description": _describe_param(param), "$ref": "#/definitions/formula"}
     schema = make_type_schema(param.type)
     bounds = {"minimum": param.ge, "maximum": param.le}
     schema |= {key: bound for key, bound in bounds.items() if bound is not None}
@@ -173,7 +180,7 @@ def _make_param_schema(param: Param) -> Schema:
         schema["examples" if param.refers_to else "enum"] = list(param.choices)
     if not param.is_required:
         schema["default"] = to_jsonable_python(param.default)
-    return {"description": _describe_param(param), **make_value_or_reference_schema(schema)}
+    return {"description": _describe_param(param), **make_value_or_reference_schema(schema, EXPRESSION)}
 
 
 def _describe_param(param: Param) -> str:
@@ -190,7 +197,10 @@ def _make_port_schema(port: Port) -> Schema:
     description = f"{'output' if is_output else 'input'}: {port.doc}"
     if is_output or not is_plain_type(port.type):
         return {"description": description, **REFERENCE}
-    return {"description": description, **make_value_or_reference_schema(make_type_schema(port.type))}
+    return {
+        "description": description,
+        **make_value_or_reference_schema(make_type_schema(port.type), EXPRESSION),
+    }
 
 
 class _FileSchema(Draft07):
@@ -256,6 +266,8 @@ def _make_file_schema(title: str, keys: type[FileKeys], skills: Skills, node_cla
             "type": "string",
             "pattern": rf"^\${grammar.NAME_EXPRESSION}(\.{grammar.NAME_EXPRESSION})?$",
         },
+        "expression": {"title": "= expression", "type": "string", "pattern": "^="},
+        "formula": {"title": "expression", "type": ["string", "boolean"]},
         **{skill: make_settings_schema(skill, skills[skill]) for skill in skills},
         **{
             word: {
@@ -313,6 +325,12 @@ def _make_node_schema(skills: Skills, node_classes: ControlNodes, definitions: d
         "anyOf": [
             *make_name_schemas(skills),
             *nodes_without_body,
+            {
+                "title": "expression",
+                "type": "string",
+                "pattern": EXPRESSION_PATTERN.pattern,
+                **NO_ITEM_SUGGESTION,
+            },
             {"type": "array", "items": _make_reference("node"), **NO_ITEM_SUGGESTION},
             {"type": "object", **NO_ITEM_SUGGESTION},
         ],
@@ -358,9 +376,14 @@ def _get_first_line(node_class: type[ControlNode]) -> str:
 
 def make_key_schema(key: Key, definitions: dict[str, Schema]) -> Schema:
     """Return the schema of the value of a key; a single value counts as a list with one item."""
+    if key.value_type == Expression:
+        return _make_reference("formula")
+    if key.value_type == AnyValue:
+        return {}
     if key.is_constant:
         constant = key.make_validator().json_schema()
-        return make_value_or_reference_schema(*constant.get("anyOf", [constant]))
+        expressions = [EXPRESSION] if key.accepts_expression else []
+        return make_value_or_reference_schema(*constant.get("anyOf", [constant]), *expressions)
     if key.value_type == Elements:
         return make_value_or_reference_schema(*make_schema(Elements, definitions)["anyOf"])
     section = key.section

@@ -15,7 +15,7 @@ from executive import events
 from executive.cell.devices import sleep_on
 from executive.cell.objects import Item
 from executive.cell.protocols import Cell, Steps
-from executive.errors import Blocked, Fault, Interrupted, Stopped, describe_error
+from executive.errors import Blocked, Fault, Finished, Interrupted, Stopped, describe_error
 from executive.events import Event, Observer, RunEnded, RunStarted, TimedEvent
 from executive.ledger.final_states import is_balanced
 from executive.ledger.tracker import Tracker
@@ -43,6 +43,7 @@ class _LoopEnd:
         message: Sentence that explains the status, or "".
         node: Path of the node that determined the status, or "".
         traceback: Traceback of the exception that caused a fault, or "".
+        skip_reason: Reason why the mission finished with open items, or "".
     """
 
     status: str
@@ -50,6 +51,7 @@ class _LoopEnd:
     message: str = ""
     node: str = ""
     traceback: str = ""
+    skip_reason: str = ""
 
 
 _HALTED = _LoopEnd("HALTED", "halted", "halted by the user")
@@ -230,7 +232,8 @@ class Run:
             problems += _catch_problems(lambda: self.emit(events.FaultRaised(loop_end.traceback)))
         has_succeeded = loop_end.status == "SUCCESS"
         problems += _catch_problems(self._store_final_state)
-        problems += _catch_problems(lambda: _finalize_items(self.station.ledger, has_succeeded))
+        skip_reason = loop_end.skip_reason
+        problems += _catch_problems(lambda: _finalize_items(self.station.ledger, has_succeeded, skip_reason))
         if problems and loop_end.status == "FAULT":
             loop_end = replace(loop_end, message="; ".join([loop_end.message, *problems]))
         elif problems:
@@ -275,6 +278,8 @@ class Run:
                 if not control.is_idle:
                     control.wait_while_paused()
             loop_end = _HALTED
+        except Finished as end:
+            return _LoopEnd("SUCCESS", skip_reason=str(end))
         except Stopped:
             loop_end = _HALTED
         except Interrupted:
@@ -325,13 +330,15 @@ def _check_items(ledger: Tracker) -> _LoopEnd:
     return _LoopEnd("SUCCESS")
 
 
-def _finalize_items(ledger: Tracker, has_tree_succeeded: bool) -> None:
+def _finalize_items(ledger: Tracker, has_tree_succeeded: bool, skip_reason: str) -> None:
     """Let the ledger set the final state of each item, and check the sum of the counts.
+
+    Open items are skipped with `skip_reason`, if the node `finish` gave one.
 
     Raises:
         Fault: The number of seen items is not the sum of the placed, rejected, skipped and lost items.
     """
-    ledger.set_final_states(completed=has_tree_succeeded)
+    ledger.set_final_states(completed=has_tree_succeeded, finish_reason=skip_reason)
     counts = ledger.count_states()
     if not is_balanced(counts):
         text = ", ".join(f"{count} {state}" for state, count in counts.items())

@@ -10,6 +10,7 @@ from executive.cell.ledger import Ledger
 from executive.cell.protocols import Clock
 from executive.events import Emit, discard_event
 from executive.tree.flow import PossibleFailure
+from executive.tree.specification import Expression
 
 
 class Blackboard(UserDict[str, object]):
@@ -65,12 +66,14 @@ class Wiring:
         inputs: Names of the variables from which inputs are read, by the name of the input.
         outputs: Names of the variables to which outputs are written, by the name of the output.
         fields: Fields that inputs read instead of the whole values of variables, by the name of the input.
+        expressions: Expressions of params and inputs, by the name of the param or input.
     """
 
     constants: Mapping[str, object] = field(default_factory=dict)
     inputs: Mapping[str, str] = field(default_factory=dict)
     outputs: Mapping[str, str] = field(default_factory=dict)
     fields: Mapping[str, str] = field(default_factory=dict)
+    expressions: Mapping[str, Expression] = field(default_factory=dict)
 
     def make_field_suffix(self, name: str) -> str:
         """Return `.label` for a port that reads the field `label` of its variable; "" for the whole value."""

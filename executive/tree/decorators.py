@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import ClassVar
+from typing import ClassVar, cast
 
 from py_trees.common import Status
 
@@ -116,13 +116,13 @@ class Timeout(ControlNode):
     reasons = ("timeout",)
     symbol = "◷"
 
-    seconds: Seconds = key(gt=0, doc="Maximum duration of the body [s].")
+    seconds: Seconds = key(gt=0, accepts_expression=True, doc="Maximum duration of the body [s].")
     do: Child = key(doc="Body.")
 
     @property
     def detail(self) -> str:
         """The limit as a text: `5 s`."""
-        return f"{self.seconds:g} s"
+        return f"{self.describe_value('seconds')} s"
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the outcomes of the body, and the timeout if the body can take more than one tick."""
@@ -139,12 +139,12 @@ class Timeout(ControlNode):
 
     def explain(self, failure: PropagatedFailure) -> str:
         """Return the duration of the body and the limit."""
-        return f"handles no failures; {failure.duration:.2f} of {self.seconds:g} s had passed"
+        return f"handles no failures; {failure.duration:.2f} of {self.describe_value('seconds')} s had passed"
 
     def advise(self, failure: PropagatedFailure) -> Iterator[tuple[str, Node]]:
         """Yield the advice to increase the limit after a timeout."""
         if failure.child is None:
-            yield f"allow more than {self.seconds:g} s", self
+            yield f"allow more than {self.describe_value('seconds')} s", self
 
     @property
     def counterpart(self) -> Counterpart | None:
@@ -159,7 +159,8 @@ class Timeout(ControlNode):
 
         def start(self) -> None:
             """Set the deadline."""
-            self._deadline = self.clock.now + self.node.seconds
+            self._seconds = cast("float", self.read_value("seconds"))
+            self._deadline = self.clock.now + self._seconds
 
         def step(self) -> Status:
             """Tick the body, then compare the clock with the deadline."""
@@ -169,6 +170,6 @@ class Timeout(ControlNode):
             # 1 ns covers the rounding errors of a clock that sums control periods.
             if status is Status.RUNNING and self.clock.now >= self._deadline - 1e-9:
                 self.halt_children([self.node.do])
-                message = f"the body did not end within {self.node.seconds:g} s"
+                message = f"the body did not end within {self._seconds:g} s"
                 return self.fail_with_reason("timeout", message)
             return status

@@ -12,12 +12,13 @@ from functools import cache, cached_property
 from inspect import get_annotations
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias, TypeVar, Union, cast, get_args, get_origin
 
-from pydantic import Field, TypeAdapter, ValidationError, WithJsonSchema
+from pydantic import Field, JsonValue, TypeAdapter, ValidationError, WithJsonSchema
 from pydantic.fields import FieldInfo
 
 from executive.tree.specification import (
     Child,
     Constant,
+    Expression,
     Node,
     Reason,
     Reference,
@@ -41,6 +42,10 @@ Elements: TypeAlias = Annotated[
 still have to be sorted."""
 
 
+AnyValue: TypeAlias = JsonValue
+"""Type of a key with any plain value, a reference or an expression."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Key:
     """A key of a control node or of a section: a pydantic field with marks.
@@ -53,6 +58,8 @@ class Key:
         in_path: True if the paths of the nodes under the key contain the key.
         list_key: For a loop variable: key of the list of its values; otherwise "".
         requires_conditions: True if each node under the key must be a condition.
+        accepts_expression: For a number: True if a mission may give an expression.
+        is_template: For an expression: True if it is a text with expressions in braces.
         name: Name of the key in the mission file.
         attribute: Name of the field.
         value_type: Type of the value; of an optional key, the type without None.
@@ -66,6 +73,8 @@ class Key:
     in_path: bool = True
     list_key: str = ""
     requires_conditions: bool = False
+    accepts_expression: bool = False
+    is_template: bool = False
     name: str = ""
     attribute: str = ""
     value_type: object = None
@@ -99,13 +108,13 @@ class Key:
     @cached_property
     def is_constant(self) -> bool:
         """True for a plain value: a number, a text, a boolean, or one of several words."""
-        is_other_value = self.value_type in (Child, Children, VariableName, Elements)
+        is_other_value = self.value_type in (Child, Children, VariableName, Elements, Expression)
         return not (is_other_value or self.section or self.has_reasons)
 
     @cached_property
     def is_plain(self) -> bool:
-        """True for a constant or a list of elements; a mission may write a reference in place of both."""
-        return self.value_type == Elements or self.is_constant
+        """True for a constant, an expression or a list; a mission may write a reference in place of each."""
+        return self.value_type in (Elements, Expression) or self.is_constant
 
     @cache  # noqa: B019 - keys exist as long as their classes
     def make_validator(self, max_value: int | None = None) -> TypeAdapter[object]:
@@ -125,8 +134,11 @@ class Key:
         """Return the typed value for a value in a mission.
 
         A valid value replaces an invalid or unknown one: for a number, a very large number; otherwise the
-        default or the first allowed value. The checks report invalid values.
+        default or the first allowed value. The checks report invalid values. The behaviour of the node
+        evaluates an expression.
         """
+        if self.value_type == Expression:
+            return value
         if self.value_type == Elements:
             if isinstance(value, Reference):
                 return VariableName(value.name, value.field, value.span)
@@ -242,6 +254,14 @@ class KeyOwner(Specification):
                 values.append((key, value))
         return values
 
+    def describe_value(self, key_name: str) -> str:
+        """Return the value of a plain key as a text; for an expression, its text."""
+        setting = self.settings.get(key_name)
+        value = getattr(self, self.keys[key_name].attribute)
+        if isinstance(setting, Expression):
+            return str(setting)
+        return f"{value:g}" if isinstance(value, float) else str(value)
+
     def list_children(self, key_name: str = "") -> Sequence[Node]:
         """Return the nodes under a key or, without a name, under all keys, including those in sections."""
         keys = [self.keys[key_name]] if key_name else self.keys.values()
@@ -252,7 +272,9 @@ class KeySection(KeyOwner):
     """Base class of sections: mappings under a key of a control node; a subclass declares the keys."""
 
 
-KeyValue: TypeAlias = Value | VariableName | Node | KeySection | tuple[Node | Reason | KeySection, ...]
+KeyValue: TypeAlias = (
+    Value | VariableName | Node | KeySection | tuple[Node | Reason | Expression | KeySection, ...]
+)
 """Value of a key of a control node."""
 Part: TypeAlias = Node | Reference | VariableName
 """A part of a node that the expansion of a mission changes."""
@@ -291,6 +313,10 @@ def _map_value(value: object, change: Callable[[Part], object]) -> object:
         return change(value)
     if isinstance(value, KeySection):
         return map_parts(value, change)
+    if isinstance(value, Expression):
+        operands = tuple([_map_value(operand, change) for operand in value.operands])
+        is_same = _are_identical(operands, value.operands)
+        return value if is_same else replace(value, operands=cast("tuple[Value, ...]", operands))
     if isinstance(value, tuple):
         items = tuple([_map_value(item, change) for item in value])
         return value if _are_identical(items, value) else items
@@ -300,7 +326,7 @@ def _map_value(value: object, change: Callable[[Part], object]) -> object:
     return value
 
 
-_CONTAINER_TYPES = (tuple, dict, Specification, VariableName)
+_CONTAINER_TYPES = (tuple, dict, Specification, VariableName, Expression)
 """Types of the attributes of a node that contain parts."""
 
 

@@ -13,9 +13,17 @@ from executive.skill import ANY, EMPTY, HOLDING
 from executive.text.findings import Finding, make_error
 from executive.tree.blackboard import Failure
 from executive.tree.flow import Flow, FlowFunction, FlowState, find_fixed_point, join_states
-from executive.tree.keys import Elements, KeySection, key
+from executive.tree.keys import Elements, key
 from executive.tree.node import ControlNode, Counterpart, NodeAnalysis, PropagatedFailure
-from executive.tree.specification import Child, Node, Reason, VariableName, format_reasons
+from executive.tree.specification import (
+    Child,
+    Expression,
+    Node,
+    Reason,
+    Reference,
+    VariableName,
+    format_reasons,
+)
 from executive.tree.tree_node import NodeBehaviour
 
 NodeRun: TypeAlias = Generator[Node | None, None, Failure | None]
@@ -125,29 +133,12 @@ class While(ControlNode):
             return None
 
 
-class CounterLimits(KeySection):
-    """Limits of counters of the run; the loop ends as soon as one counter reaches its limit."""
-
-    any_of = ("placed", "rejected", "elapsed")
-
-    placed: int | None = key(default=None, ge=0, doc="Number of items that the run has placed.")
-    rejected: int | None = key(default=None, ge=0, doc="Number of items that the run has rejected.")
-    elapsed: float | None = key(default=None, gt=0, doc="Time since the start of the run [s].")
-
-    def __str__(self) -> str:
-        return ", ".join(f"{name}: {limit:g}" for name, limit in self.list_limits())
-
-    def list_limits(self) -> list[tuple[str, float]]:
-        """Return the counters that have a limit, with their limits."""
-        return [(name, limit) for name in self.keys if (limit := getattr(self, name)) is not None]
-
-
 class Repeat(ControlNode):
-    """Run the body until a number of iterations, an expected failure, or the limit of a counter is reached.
+    """Run the body until a number of iterations, an expected failure, or a true expression ends the loop.
 
-    Each of these three conditions ends the loop with success. The loop reads the counters before each
-    iteration, and does not interrupt an iteration. Any other failure of the body ends the loop and is passed
-    on.
+    Each of these three ends the loop with success. The loop evaluates the expressions before each iteration,
+    and `times` before the first one; it does not interrupt an iteration. Any other failure of the body ends
+    the loop and is passed on.
 
     * BehaviorTree.CPP: `Repeat`; with `until`, a custom node `repeat`, as failures have no reasons there.
     * py_trees: `decorators.Repeat`. Each iteration begins in a new tick, and there is no `until`.
@@ -158,16 +149,16 @@ class Repeat(ControlNode):
     any_of = ("times", "until")
     unreachable_reason = "the body runs 0 times"
 
-    times: int | None = key(default=None, ge=0, doc="Maximum number of iterations.")
-    until: tuple[Reason | CounterLimits, ...] = key(
-        default=(), doc="Failures and limits of counters that end the loop with success."
+    times: int | None = key(default=None, ge=0, accepts_expression=True, doc="Maximum number of iterations.")
+    until: tuple[Reason | Expression, ...] = key(
+        default=(), doc="Failures, and expressions after `=`, that end the loop with success."
     )
     do: Child = key(doc="Body of the loop.")
 
     @property
     def detail(self) -> str:
         """The conditions that end the loop, as a text."""
-        conditions = [] if self.times is None else [f"{self.times} times"]
+        conditions = [] if self.times is None else [f"{self.describe_value('times')} times"]
         if self.until:
             conditions.append(f"until {format_reasons(self.until)}")
         return " or ".join(conditions)
@@ -178,46 +169,46 @@ class Repeat(ControlNode):
         return [end for end in self.until if isinstance(end, Reason)]
 
     @property
-    def limits(self) -> list[tuple[str, float]]:
-        """Counters that have a limit, with their limits."""
-        return [limit for end in self.until if isinstance(end, CounterLimits) for limit in end.list_limits()]
-
-    @property
-    def is_empty(self) -> bool:
-        """True if the body never runs."""
-        return self.times == 0 or any(limit == 0 for _, limit in self.limits)
+    def ends(self) -> list[Expression]:
+        """Expressions that end the loop with success."""
+        return [end for end in self.until if isinstance(end, Expression)]
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the possible outcomes; the next iteration starts in the state after success of the body."""
-        if self.is_empty:
+        if self.times == 0:
             return Flow(state, {}, None)
         body, entry = find_fixed_point(
             get_flow, self.do, state, lambda body: None if self.times == 1 else body.success
         )
         reasons = self.expected_reasons
         expected_ends = [end for failure, end in body.failures.items() if failure.may_match(reasons)]
-        # A counter may have reached its limit before the first iteration.
-        last_ends = (None if self.times is None else body.success, entry if self.limits else None)
+        # An expression may end the loop before the first iteration.
+        may_be_empty = bool(self.ends) or isinstance(self.settings.get("times"), Expression)
+        last_ends = (None if self.times is None else body.success, entry if may_be_empty else None)
         success = join_states((*expected_ends, *last_ends))
         failures = {cause: end for cause, end in body.failures.items() if not cause.matches(reasons)}
         return Flow(success, failures, join_states((body.halted, entry)))
 
     def check(self, analysis: NodeAnalysis) -> Iterator[Finding]:
-        """Yield an error if only a limit of `placed` can end the loop, and the body places no item."""
-        has_only_placed = {name for name, _ in self.limits} == {"placed"} and not self.expected_reasons
-        if not has_only_placed or self.is_empty or self.times or analysis.is_concurrent:
+        """Yield an error if only a count of placed items can end the loop, and the body places no item."""
+        if self.expected_reasons or not self.ends or self.times is not None or analysis.is_concurrent:
             return
         skills = analysis.list_skills(self).values()
-        if not any(skill is None or skill.tool_state in ((HOLDING, EMPTY), (ANY, EMPTY)) for skill in skills):
-            message = "this loop never succeeds: its body releases no object, so `placed` does not increase"
-            hint = "Add a failure reason or `elapsed` to `until`, or add `times`."
+        may_place = any(
+            skill is None or skill.tool_state in ((HOLDING, EMPTY), (ANY, EMPTY)) for skill in skills
+        )
+        if not may_place and all(_reads_only_placed(end) for end in self.ends):
+            message = (
+                "this loop never succeeds: its body releases no object, so `run.placed` does not increase"
+            )
+            hint = "Add a failure reason or `= run.elapsed >= 60` to `until`, or add `times`."
             yield make_error(self.span, "endless", message, hint)
 
     def explain(self, failure: PropagatedFailure) -> str:
         """Return why the loop passed on a failure of its body."""
         if self.until:
             return f"this failure is not in until ({format_reasons(self.until)})"
-        return f"a failure ends the loop before its {self.times} iterations are complete"
+        return f"a failure ends the loop before its {self.describe_value('times')} iterations are complete"
 
     @property
     def counterpart(self) -> Counterpart | None:
@@ -232,6 +223,7 @@ class Repeat(ControlNode):
         def run(self) -> NodeRun:
             """Run the body until the loop is complete, or the body fails."""
             iteration_count = 0
+            self._times = cast("int | None", self.read_value("times"))
             while not self._is_complete(iteration_count):
                 if failure := (yield from self.run_child(self.node.do)):
                     if not failure.matches(self.node.expected_reasons):
@@ -241,21 +233,25 @@ class Repeat(ControlNode):
                 iteration_count += 1
                 if not self._is_complete(iteration_count):
                     yield from self.end_iteration()
-            if reached_limit := self._find_reached_limit():
-                self.report_choice(f"done, {reached_limit}")
+            if end := self._find_true_end():
+                self.report_choice(f"done, {end}")
             return None
 
         def _is_complete(self, iteration_count: int) -> bool:
             """Return True if no further iteration may begin."""
-            return iteration_count == self.node.times or bool(self._find_reached_limit())
+            has_all = self._times is not None and iteration_count >= self._times
+            return has_all or self._find_true_end() is not None
 
-        def _find_reached_limit(self) -> str:
-            """Return the first limit that a counter has reached, as a text: `placed: 4`; "" if none."""
-            for name, limit in self.node.limits:
-                count = self.clock.now if name == "elapsed" else self.ledger.count_items(name)
-                if count >= limit:
-                    return f"{name}: {limit:g}"
-            return ""
+        def _find_true_end(self) -> Expression | None:
+            """Return the first expression of `until` that is true, or None."""
+            return next((end for end in self.node.ends if self.scope.evaluate(end)), None)
+
+
+def _reads_only_placed(expression: Expression) -> bool:
+    """Return True if `run.placed` is all that an expression reads."""
+    operands = list(expression.walk())
+    fields = [str(one) for one in operands if isinstance(one, Expression) and one.operator in ("run", "bin")]
+    return set(fields) == {"run.placed"} and not any(isinstance(one, Reference) for one in operands)
 
 
 class ForEach(ControlNode):
@@ -339,7 +335,7 @@ class ForEach(ControlNode):
                 return tuple(known.item for known in self.ledger.list_known_items() if known.is_open)
             value = self.blackboard.get(variable)
             if variable.field and value is not None:
-                value = getattr(value, variable.field)
+                value = self.scope.read(variable, variable.field)
             if isinstance(value, list | tuple):
                 return tuple(value)
             problem = f"it reads {self.blackboard.describe_missing(variable)}"

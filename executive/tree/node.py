@@ -105,6 +105,7 @@ class ControlNode(KeyOwner, Node):
         symbol: Character before the name of the node in drawings.
         remedy: Beginning of the advice to handle a failure with this node, such as `add a retry around`; the
             name of the failing node is appended. "" if this node handles no failures.
+        ends_mission: True if the mission succeeds when the node runs.
         is_condition: True if the node counts as a condition; its keys must then accept only conditions.
         unreachable_reason: Reason why a child never runs, if each node of the class has the same reason.
         Behaviour: Class that runs the node.
@@ -114,6 +115,7 @@ class ControlNode(KeyOwner, Node):
     reasons: ClassVar[tuple[str, ...]] = ()
     symbol: ClassVar[str] = "◇"
     remedy: ClassVar[str] = ""
+    ends_mission: ClassVar[bool] = False
     is_condition: ClassVar[bool] = False
     unreachable_reason: ClassVar[str] = ""
     Behaviour: ClassVar[type[NodeBehaviour]]
@@ -127,6 +129,11 @@ class ControlNode(KeyOwner, Node):
     def children(self) -> Sequence[Node]:
         """The nodes in the values of the keys and in sections."""
         return self.list_children()
+
+    @property
+    def own_reasons(self) -> tuple[str, ...]:
+        """Reasons of the failures that this node itself causes."""
+        return self.reasons
 
     @property
     def detail(self) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from math import inf, isfinite
+from typing import cast
 
 from executive.skill import Seconds
 from executive.text.findings import Finding, make_warning
@@ -12,7 +13,7 @@ from executive.tree.flow import Flow, FlowFunction, FlowState, find_fixed_point,
 from executive.tree.keys import KeySection, Reasons, key
 from executive.tree.loops import GeneratorBehaviour, NodeRun
 from executive.tree.node import ControlNode, Counterpart, NodeAnalysis, PropagatedFailure
-from executive.tree.specification import Child, Constant, Node, Reason, format_reasons
+from executive.tree.specification import Child, Constant, Expression, Node, Reason, format_reasons
 
 _GIVE_UP = "give up: the recovery failed"
 """Choice that a retry reports after a failure of its recovery."""
@@ -53,7 +54,7 @@ class Retry(ControlNode):
     keyword = "retry"
     symbol = "↻"
 
-    attempts: int = key(ge=1, doc="Maximum number of attempts, including the first.")
+    attempts: int = key(ge=1, accepts_expression=True, doc="Maximum number of attempts, including the first.")
     on: Reasons = key(default=(), doc="Failures after which the body runs again; every failure if not given.")
     recover: Child | None = key(default=None, doc="Node to run before every further attempt.")
     backoff: Backoff | None = key(
@@ -66,7 +67,7 @@ class Retry(ControlNode):
         """Maximum number of attempts, failures that cause further attempts, and delays, as a text."""
         reasons = format_reasons(self.on) or "any failure"
         backoff_text = "" if self.backoff is None else f", backoff {self.backoff}"
-        return f"up to {self.attempts} attempts, on {reasons}{backoff_text}"
+        return f"up to {self.describe_value('attempts')} attempts, on {reasons}{backoff_text}"
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the possible outcomes, by fixed-point iteration over body and recovery."""
@@ -118,23 +119,22 @@ class Retry(ControlNode):
         if failure.last_choice == _GIVE_UP:
             attempt, _ = self.count_attempts(failure)
             cause = f"{failure.last_handled_name}: {failure.last_messages[failure.last_handled_name]}"
-            return f"gave up after attempt {attempt} of {self.attempts}: its recovery failed with {cause}"
+            attempts = self.describe_value("attempts")
+            return f"gave up after attempt {attempt} of {attempts}: its recovery failed with {cause}"
         if self.on and not failure.matches(self.on):
             earlier_failures = f"; failures before: {_format_counts(counts)}" if counts else ""
             return f"runs again only after {format_reasons(self.on)}{earlier_failures}"
         counts[failure.name] += 1
         if self.attempts == 1:
             return "has no second attempt"
-        return f"all {self.attempts} attempts failed: {_format_counts(counts)}"
+        return f"all {self.describe_value('attempts')} attempts failed: {_format_counts(counts)}"
 
     def count_attempts(self, failure: PropagatedFailure) -> tuple[int, int]:
         """Return the number of the failed attempt and the number of allowed attempts."""
-        handled_count = sum(failure.handled_counts.values())
-        if failure.last_choice == _GIVE_UP:
-            # The node has handled the failures of all attempts and the failure of the recovery.
-            return handled_count - 1, self.attempts
-        # The node passed on the failure of the last attempt without handling it.
-        return handled_count + 1, self.attempts
+        # The node passed on the failure of the last attempt without handling it, or it has handled the
+        # failures of all attempts and the failure of the recovery.
+        attempt = sum(failure.handled_counts.values()) + (-1 if failure.last_choice == _GIVE_UP else 1)
+        return attempt, attempt if isinstance(self.settings.get("attempts"), Expression) else self.attempts
 
     def advise(self, failure: PropagatedFailure) -> Iterator[tuple[str, Node]]:
         """Yield the advice to handle a failure in the recovery, or to allow more attempts."""
@@ -164,18 +164,15 @@ class Retry(ControlNode):
         def run(self) -> NodeRun:
             """Run the body until it succeeds or no attempt is left; in between, wait and run `recover`."""
             attempt = 1
+            attempts = cast("int", self.read_value("attempts"))
             while True:
                 failure = yield from self.run_child(self.node.do)
-                if (
-                    not failure
-                    or attempt == self.node.attempts
-                    or (self.node.on and not failure.matches(self.node.on))
-                ):
+                if not failure or attempt >= attempts or (self.node.on and not failure.matches(self.node.on)):
                     return failure
                 delay = 0.0 if self.node.backoff is None else self.node.backoff.compute_delay(attempt)
                 delay_text = f" in {delay:g} s" if delay else ""
                 attempt += 1
-                self.report_choice(f"attempt {attempt} of {self.node.attempts}{delay_text}", failure)
+                self.report_choice(f"attempt {attempt} of {attempts}{delay_text}", failure)
                 yield from self.clock.sleep(delay)
                 if self.node.recover and (recovery_failure := (yield from self.run_child(self.node.recover))):
                     self.report_choice(_GIVE_UP, recovery_failure)

@@ -5,8 +5,9 @@ Control nodes, which declare their keys, are in `executive.tree.node`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Annotated, TypeVar
 
@@ -67,6 +68,9 @@ class Constant:
         """The origin in brackets, for the end of a sentence about the value; "" for no reference."""
         return f" (value of {self.origin})" if self.origin else ""
 
+    def __str__(self) -> str:
+        return self.origin.partition(" ")[0] or json.dumps(self.value, ensure_ascii=False)
+
     def get_element_span(self, index: int) -> Span:
         """Return the position of an element, or the position of the list if the element has no position."""
         return self.element_spans[index] if index < len(self.element_spans) else self.span
@@ -100,7 +104,77 @@ class InvalidValue:
     span: Span
 
 
-Value = Constant | Reference | InvalidValue
+@dataclass(frozen=True)
+class Expression:
+    """A formula that a run evaluates when its node starts, for instance `= $n + 1`.
+
+    Attributes:
+        operator: Name of the operation (`executive.tree.expression`): `+`, `>=`, `and`, `min`, `run`, ….
+        operands: Operands of the operation.
+        span: Position of the operation in the file.
+    """
+
+    operator: str
+    operands: tuple[Value, ...]
+    span: Span
+
+    def walk(self) -> Iterator[Value]:
+        """Yield the expression and every operand in it, from left to right."""
+        yield self
+        for operand in self.operands:
+            yield from operand.walk() if isinstance(operand, Expression) else (operand,)
+
+    def mark_candidate(self, name: str) -> Expression:
+        """Return the expression with `.name`, which is the name of no variable, in place of `name`."""
+
+        def mark(operand: Value) -> Value:
+            if isinstance(operand, Expression):
+                return operand.mark_candidate(name)
+            if isinstance(operand, Reference) and operand.name == name:
+                return replace(operand, name=f".{name}")
+            return operand
+
+        return replace(self, operands=tuple(map(mark, self.operands)))
+
+    def __str__(self) -> str:
+        names = [_format_operand(operand) for operand in self.operands]
+        match self.operator:
+            case "value":
+                return names[0]
+            case "text":
+                pairs = zip(self.operands, names, strict=True)
+                return "".join(
+                    str(one.value) if isinstance(one, Constant) else f"{{{name}}}" for one, name in pairs
+                )
+            case "run" | "bin":
+                name = names[0].strip('"')
+                return f"run.{name}" if self.operator == "run" else f"bin.{name}.count"
+            case "negative" | "not":
+                return f"{'-' if self.operator == 'negative' else 'not '}{names[0]}"
+            case "min" | "max" | "abs" | "round":
+                return f"{self.operator}({', '.join(names)})"
+        return f" {self.operator} ".join(names)
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, *_: object) -> core_schema.CoreSchema:
+        """Return a schema that accepts every value."""
+        return core_schema.any_schema()
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, *_: object) -> dict[str, JsonValue]:
+        """Return the reference to the definition in the schema of missions."""
+        return {"definition": "expression"}
+
+
+Value = Constant | Reference | Expression | InvalidValue
+
+
+def _format_operand(value: Value) -> str:
+    """Return the text of an operand, with brackets around an operation of two operands."""
+    has_symbol = (
+        isinstance(value, Expression) and len(value.operands) > 1 and value.operator not in ("min", "max")
+    )
+    return f"({value})" if has_symbol else str(value)
 
 
 class LocatedName(str):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
+from dataclasses import replace
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -15,7 +16,8 @@ from executive.errors import Fault, Interrupted, Stopped, describe_error, to_tex
 from executive.events import BranchChosen, Event, NodeEnded, NodeStarted
 from executive.skill import Direction, Skill, SkillFailed, get_attribute_name
 from executive.tree.blackboard import Failure, NodeContext, Wiring
-from executive.tree.specification import Node
+from executive.tree.expression import Scope
+from executive.tree.specification import Expression, Node
 
 
 class TreeNode(Behaviour):
@@ -99,6 +101,7 @@ class NodeBehaviour(TreeNode):
         behaviour_by_child: Behaviour of each child of the specification.
         clock: Clock of the run.
         ledger: Ledger of the run.
+        scope: What the expressions of the node can read.
     """
 
     def __init__(self, context: NodeContext, node: Node, build_child: Callable[[Node], Behaviour]) -> None:
@@ -107,6 +110,7 @@ class NodeBehaviour(TreeNode):
         self.behaviour_by_child = {child: build_child(child) for child in node.children}
         self.clock = context.clock
         self.ledger = context.ledger
+        self.scope = Scope(context.blackboard, context.ledger, context.clock)
         self.children = list(self.behaviour_by_child.values())
         self._awaited: dict[Node, Status | None] = {}
         """Children of `await_child`, each with its status in the current tick; None before its tick."""
@@ -129,6 +133,11 @@ class NodeBehaviour(TreeNode):
 
     def clean_up(self) -> None:
         """End an activation; called once per activation, also after a halt or a fault."""
+
+    def read_value(self, key: str) -> object:
+        """Return the value of a plain key of the node, or the present value of its expression."""
+        value = getattr(self.node, "settings", {}).get(key)
+        return self.scope.evaluate(value) if isinstance(value, Expression) else getattr(self.node, key)
 
     def tick_child(self, child: Node) -> Status:
         """Tick a child and return its status."""
@@ -338,6 +347,7 @@ class SkillLeaf(TreeNode):
         """The constants, and each variable whose name differs from its port, as a text for drawings."""
         texts = [self.skill_name] if self.label else []
         texts += [f"{name}: {_format_value(value)}" for name, value in self.wiring.constants.items()]
+        texts += [f"{name}: {expression}" for name, expression in self.wiring.expressions.items()]
         for port, variable in {**self.wiring.inputs, **self.wiring.outputs}.items():
             # A variable of a subtree has the name of the subtree as a prefix: `pick.target`.
             name = variable.rpartition(".")[2] + self.wiring.make_field_suffix(port)
@@ -396,23 +406,32 @@ class SkillLeaf(TreeNode):
         inputs = self._read_inputs()
         self._item = self._find_item(inputs)
         self.emit(NodeStarted(self.path, self.skill_name, self._item))
-        self._run = SkillRun(self.skill_type(**self.wiring.constants, **inputs), self._cell)
+        computed = {name: self._compute(name, value) for name, value in self.wiring.expressions.items()}
+        self._run = SkillRun(self.skill_type(**self.wiring.constants, **inputs, **computed), self._cell)
         return self._run
 
     def _read_inputs(self) -> dict[str, object]:
         inputs = {}
         for port, variable in self.wiring.inputs.items():
             if variable in self.blackboard:
-                inputs[port] = self._read_value(self.blackboard[variable], self.wiring.fields.get(port))
+                field = self.wiring.fields.get(port)
+                inputs[port] = self._scope.read(variable, field) if field else self.blackboard[variable]
             elif port not in self.skill_type.ports or self.skill_type.ports[port].is_required:
                 raise Fault(f'the input "{port}" reads {self.blackboard.describe_missing(variable)}')
         return inputs
 
-    def _read_value(self, value: object, field_name: str | None) -> object:
-        """Return a value, or a field of the value; for an item, the ledger contains the current fields."""
-        if field_name is None:
-            return value
-        return getattr(self._cell.ledger.describe(value) if isinstance(value, str) else value, field_name)
+    @property
+    def _scope(self) -> Scope:
+        """What the expressions of the node can read."""
+        return Scope(self.blackboard, self._cell.ledger, self._cell.clock)
+
+    def _compute(self, name: str, expression: Expression) -> object:
+        """Return the value of an expression for a param or input, or its function of a candidate."""
+        param = self.skill_type.params.get(name)
+        if param is None or not param.candidate:
+            return self._scope.evaluate(expression)
+        candidate = param.candidate
+        return lambda value: replace(self._scope, local_values={f".{candidate}": value}).evaluate(expression)
 
     def _find_item(self, values: Mapping[str, object]) -> str:
         """Return the item on which the skill acts, from the values of its ports; "" for no item."""

@@ -13,6 +13,8 @@ from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
+from executive.errors import InputError
+from executive.mission.expand import initialize_variables
 from executive.mission.mission_file import Mission, Subtree
 from executive.mission.ports import find_written_variables
 from executive.skill import Direction, Param, Port, Skill
@@ -21,6 +23,8 @@ from executive.tree.node import ControlNode, load_control_nodes
 from executive.tree.specification import (
     Child,
     Constant,
+    Expression,
+    InvalidValue,
     Node,
     Reason,
     Reference,
@@ -63,13 +67,15 @@ class _Exporter:
         root = Element("root", BTCPP_format="4", main_tree_to_execute=self._main_id)
         values: dict[str, Value] = {name: param.value for name, param in self._mission.params.items()}
         assert self._mission.tree is not None
-        body = _replace_params(self._mission.tree, values)
+        tree = initialize_variables(self._mission.tree, self._mission.variables)
+        body = _replace_params(tree, values)
         main = SubElement(root, "BehaviorTree", ID=self._main_id, _description=self._mission.description)
         self._add_node(main, body)
         # The export of a subtree may append further subtrees.
         for subtree in self._used_subtrees:
             visible_names = () if subtree.library else values.keys() - subtree.arguments
-            body = _replace_params(subtree.body, {name: values[name] for name in visible_names})
+            tree = initialize_variables(subtree.body, subtree.variables)
+            body = _replace_params(tree, {name: values[name] for name in visible_names})
             tree_id = self._tree_ids[subtree.name]
             self._add_node(SubElement(root, "BehaviorTree", ID=tree_id, _description=subtree.doc), body)
         models = sorted(self._models.values(), key=lambda model: (model.tag, model.attrib["ID"]))
@@ -130,12 +136,16 @@ class _Exporter:
     def _add_control_node(self, parent: Element, node: ControlNode) -> Element:
         counterpart = node.counterpart
         # A value that refers to an argument is unknown here, and must be passed as a port.
-        unknown_keys = {name for name, value in node.settings.items() if isinstance(value, Reference)}
+        unknown_keys = {
+            name for name, value in node.settings.items() if isinstance(value, Reference | Expression)
+        }
         if counterpart is None or unknown_keys - {*counterpart.ports.values()}:
             return self._add_custom_node(parent, node.keyword, node)
         element = SubElement(parent, counterpart.name)
         for port, value in counterpart.ports.items():
-            element.set(port, _format(node.settings[value]) if isinstance(value, str) else str(value))
+            setting = node.settings[value] if isinstance(value, str) else None
+            text = _format_script(setting) if isinstance(setting, Expression) else str(value)
+            element.set(port, _format(setting) if isinstance(setting, Constant | Reference) else text)
         for child in node.children:
             self._add_node(element, child)
         return element
@@ -144,7 +154,11 @@ class _Exporter:
         """Add a custom node for `part`, which is a control node, or a section that contains nodes."""
         keys = part.keys.values()
         ports = [_make_port(key) for key in keys if not key.has_nodes]
-        values = {key.name: _format(value) for key, value in part.list_values() if not key.has_nodes}
+        values = {
+            key.name: _format_script(value) if isinstance(value, Expression) else _format(value)
+            for key, value in part.list_values()
+            if not key.has_nodes
+        }
         kinds = [(key.value_type, key.is_required) for key in keys if key.has_nodes]
         kind = "Decorator" if kinds == [(Child, True)] else "Control"
         element = self._add_element(parent, kind, name, ports, values)
@@ -194,11 +208,64 @@ def _format(value: KeyValue) -> str:
             return _format_pointer(f"{name}.{field}" if field else name)
         case VariableName():
             return _format_pointer(value)
+        case Expression(operator="value", operands=(Reference() as reference,)):
+            return _format(reference)
+        case Expression():
+            raise InputError(
+                f"a port of BehaviorTree.CPP takes no expression: {value}; set a variable before"
+            )
         case KeySection() as section:
             return ",".join(f"{key.name}={_format(one)}" for key, one in section.list_values())
         case tuple() as items:
-            return ";".join(str(one) if isinstance(one, Reason) else _format(one) for one in items)
+            return ";".join(_format_end(one) for one in items)
+        case InvalidValue():
+            return ""
     raise TypeError(f"{value} cannot be written as the value of a port")
+
+
+_SCRIPT_OPERATORS = {
+    **{name: name for name in ("==", "!=", "<", "<=", ">", ">=", "+", "-", "*", "/")},
+    "and": "&&", "or": "||",
+}  # fmt: skip
+"""Operators of the scripts of BehaviorTree.CPP 4, by the name of the operation."""
+
+
+def _format_script(value: Value) -> str:
+    """Return an expression as a script, in which fields and counters are entries such as `target_x`.
+
+    Raises:
+        InputError: The scripts have no such operation.
+    """
+    match value:
+        case Constant(value=constant):
+            if "'" in str(constant):
+                raise InputError(f"scripts of BehaviorTree.CPP cannot contain the text {value}")
+            return f"'{constant}'" if isinstance(constant, str) else _format_constant(constant)
+        case Reference(name=name, field=field):
+            return _escape(f"{name}_{field}" if field else name).replace(".", "_")
+        case Expression(operator="value", operands=(operand,)):
+            return _format_script(operand)
+        case Expression(operator="run" | "bin", operands=(Constant(value=name),)):
+            return f"run_{name}" if value.operator == "run" else f"bin_{name}_count"
+        case Expression(operator="text"):
+            return str(value)
+        case Expression(operator="negative" | "not", operands=(operand,)):
+            return f"{'-' if value.operator == 'negative' else '!'}({_format_script(operand)})"
+        case Expression(operator=name, operands=operands) if name in _SCRIPT_OPERATORS:
+            return f" {_SCRIPT_OPERATORS[name]} ".join(
+                f"({_format_script(one)})" if isinstance(one, Expression) else _format_script(one)
+                for one in operands
+            )
+    raise InputError(
+        f"scripts of BehaviorTree.CPP cannot express {value}; use another expression, or a skill"
+    )
+
+
+def _format_end(value: Node | Reason | Expression | KeySection) -> str:
+    """Return a reason or expression in a list, such as that of `until`."""
+    if isinstance(value, Reason):
+        return str(value)
+    return _format_script(value) if isinstance(value, Expression) else _format(value)
 
 
 def _make_port(key: Key) -> Port:

@@ -67,7 +67,7 @@ def test_json_tells_everything_of_one_skill_as_one_object_and_of_all_as_one_arra
     }  # fmt: skip
     assert params[0] == {
         "name": "gap", "type": "float", "unit": "m", "required": False, "default": 0.01, "min": 0,
-        "max": 0.05, "choices": None, "refers": "", "doc": "between two items",
+        "max": 0.05, "choices": None, "refers": "", "doc": "between two items", "candidate": "",
     }  # fmt: skip
     assert [tuple(one[key] for key in ("required", "default", "refers", "choices")) for one in params] == [
         (False, 0.01, "", None), (True, None, "bin", None), (False, "rows", "", ["rows", "columns"]),
@@ -75,7 +75,7 @@ def test_json_tells_everything_of_one_skill_as_one_object_and_of_all_as_one_arra
     ]  # fmt: skip
     assert ports[0] == {
         "name": "held", "type": "str", "direction": "in", "required": True, "default": None,
-        "refers": "item", "compared_with": "", "doc": "what to put down",
+        "refers": "item", "doc": "what to put down",
     }  # fmt: skip
     assert [(port["name"], port["type"], port["direction"], port["required"]) for port in ports[1:]] == [
         ("beside", "list[str] | None", "in", False), ("placed", "str", "out", False),

@@ -48,21 +48,21 @@ def execute(write: Callable[[str], Path]) -> Execute:
     return lambda text: run_mission(write(text), arrange=put_four)
 
 
-def list_ends(result: MissionResult, skill: str) -> list[NodeEnded]:
-    """Return the ends of all nodes that run a skill."""
+def list_ends(result: MissionResult) -> list[NodeEnded]:
+    """Return the ends of all nodes `holds`."""
     ends = (timed.event for timed in result.events if isinstance(timed.event, NodeEnded))
-    return [end for end in ends if end.skill == skill]
+    return [end for end in ends if end.node.endswith("holds")]
 
 
 def compare(value: str, to: str) -> str:
     """Return a tree that selects an object and compares a value; the nearest object is a cube."""
-    return f"tree: [{{use: look}}, SelectTarget, {{IsEqual: {{value: {value}, to: {to}}}}}]"
+    return f"tree: [{{use: look}}, SelectTarget, {{holds: {value} == {to}}}]"
 
 
 @pytest.mark.parametrize(
     ("value", "to"),
     [
-        ("$target.label", "cube"),
+        ("$target.label", "'cube'"),
         ("$target.item", "$item"),
         ("$item.label", "$target.label"),
         ("$item.attempts", "0"),
@@ -76,10 +76,10 @@ def test_a_skill_reads_a_field_of_a_variable(execute: Execute, value: str, to: s
 def test_the_fields_of_an_item_are_read_from_the_ledger_when_the_skill_starts(execute: Execute) -> None:
     result = execute(
         "tree:\n"
-        "  - [{use: look}, SelectTarget, {IsEqual: {value: $item.deferrals, to: 0}}]\n"
-        "  - [Defer, {IsEqual: {value: $item.deferrals, to: 1}}]\n"
-        "  - [{IsEqual: {value: $item.state, to: deferred}}, {use: carry}]\n"
-        "  - [{IsEqual: {value: $item.state, to: placed}}, {IsEqual: {value: $item.bin, to: red_bin}}]\n"
+        "  - [{use: look}, SelectTarget, {holds: $item.deferrals == 0}]\n"
+        "  - [Defer, {holds: $item.deferrals == 1}]\n"
+        "  - [{holds: $item.state == 'deferred'}, {use: carry}]\n"
+        "  - [{holds: $item.state == 'placed'}, {holds: $item.bin == 'red_bin'}]\n"
     )
     assert (result.status, result.message, result.items["placed"]) == ("SUCCESS", "", 1)
 
@@ -91,9 +91,9 @@ def test_a_loop_goes_through_a_field_with_a_list(execute: Execute) -> None:
         "  - for_each:\n"
         "      each: one\n"
         "      in: $detections.confident\n"
-        "      do: {fallback: [{IsEqual: {value: $one.label, to: cube}}, succeed]}\n"
+        "      do: {fallback: [{holds: $one.label == 'cube'}, succeed]}\n"
     )
-    assert sorted(end.status for end in list_ends(result, "IsEqual")) == ["FAILURE"] * 2 + ["SUCCESS"] * 2
+    assert sorted(end.status for end in list_ends(result)) == ["FAILURE"] * 2 + ["SUCCESS"] * 2
 
 
 @pytest.mark.parametrize(
@@ -109,11 +109,11 @@ def test_a_word_stands_for_a_list_of_names(execute: Execute, word: str, elements
     result = execute(
         "tree:\n"
         "  - use: look\n"
-        f"  - for_each: {{each: one, in: {word}, do: {{try: {{IsEqual: {{value: $one, to: no}}}},"
-        " catch: [{on: [IsEqual.different], do: succeed}]}}\n"
+        f"  - for_each: {{each: one, in: {word}, do: {{try: {{holds: \"$one == 'no'\"}},"
+        " catch: [{on: [holds.false], do: succeed}]}}\n"
     )
-    messages = [end.message for end in list_ends(result, "IsEqual")]
-    assert sorted(messages) == sorted(f"the value is {element}, not no" for element in elements)
+    messages = [end.message for end in list_ends(result)]
+    assert sorted(message.rpartition("= ")[2] for message in messages) == sorted(elements)
 
 
 def test_a_word_is_no_mistake_if_the_cell_file_has_errors(tmp_path: Path) -> None:

@@ -133,7 +133,10 @@ tree:
     catch: [{on: Pick.missed, do: Look}]
     finally: Look
     as: tried
-  - timeout: {seconds: 1.5, do: Look}
+  - timeout: {seconds: "= 1.5 * $n", do: Look}
+  - if: {holds: $n < 3, then: Look, else: [{holds: $n == 4}, {set: n, to: = $n + 1}]}
+  - {fail: "only {$n}", as: too_few}
+  - finish: enough
   - use: look
     with: {view: full, height: 0.1}
     returns: {seen: $mine}

@@ -50,7 +50,7 @@ def test_a_success_has_no_story() -> None:
          "timeout: handles no failures; 0.50 of 2 s had passed"),
         ("  fallback: [{invert: succeed}, IsHolding]\n",
          "fallback: all 2 choices failed; the earlier ones failed with invert.inverted (succeed succeeded)"),
-        ("  guard: {holds: {not: {HasElapsed: {seconds: 9}}}, do: [{Wait: {seconds: 0.1}}, IsHolding]}\n",
+        ("  guard: {holds: run.elapsed < 9, do: [{Wait: {seconds: 0.1}}, IsHolding]}\n",
          "guard: handles no failures of its body"),
         ("  parallel: [{Wait: {seconds: 0.1}}, IsHolding]\n", "parallel: needs all 2 branches"),
         ("  parallel:\n    wait_for: any\n    do: [[{Wait: {seconds: 0.1}}, {invert: succeed}], IsHolding]\n",

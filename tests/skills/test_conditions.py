@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +10,7 @@ import pytest
 from executive.cell.objects import Target
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
-from skills.conditions import HasCounted, HasElapsed, IsFresh, IsHolding, IsPlaced, IsReachable
+from skills.conditions import IsFresh, IsHolding, IsPlaced, IsReachable
 from skills.confirm_grasp import ConfirmGrasp
 from skills.wait import Wait
 
@@ -52,44 +51,6 @@ def test_an_item_is_placed_when_it_is_in_a_bin(fake: FakeCell, held: str) -> Non
     assert run_skill(IsPlaced(item=held), fake).reason == "not_placed"
     fake.ledger.record_placement(held, "red_bin")
     assert run_skill(IsPlaced(item=held), fake).status == "SUCCESS"
-
-
-def test_a_time_has_elapsed_once_the_clock_reaches_it(fake: FakeCell) -> None:
-    condition = HasElapsed(seconds=fake.cell.clock.now + 2 * fake.cell.clock.step)
-    assert run_skill(condition, fake).reason == "too_early"
-    fake.advance()
-    fake.advance()
-    assert run_skill(condition, fake).status == "SUCCESS"
-
-
-@pytest.fixture
-def counted(fake: FakeCell, look: Any) -> FakeCell:
-    """A cell with two placed cubes in different bins, a placed duck and a rejected sphere."""
-    for index, label in enumerate(["cube", "cube", "duck", "sphere"]):
-        fake.world.put(label, 0.45 + 0.12 * (index % 2), 0.15 * (index // 2))
-    items = {target.item for target in look()}
-    assert items == {"cube-1", "cube-2", "duck-1", "sphere-1"}
-    for item, bin in {"cube-1": "red_bin", "cube-2": "blue_bin", "duck-1": "red_bin"}.items():
-        fake.ledger.record_placement(item, bin)
-    fake.ledger.reject("sphere-1", "it slips")
-    return fake
-
-
-@pytest.mark.parametrize(
-    ("values", "count"),
-    [
-        ({}, 3),
-        ({"of_class": "cube"}, 2),
-        ({"inside": "red_bin"}, 2),
-        ({"of_class": "cube", "inside": "red_bin"}, 1),
-        ({"of_class": "sphere", "counter": "rejected"}, 1),
-        ({"of_class": "cube", "counter": "rejected"}, 0),
-    ],
-)
-def test_it_succeeds_up_to_the_number_of_counted_items(counted: FakeCell, values: Any, count: int) -> None:
-    results = [run_skill(HasCounted(at_least=number, **values), counted) for number in range(1, 5)]
-    assert [result.reason for result in results] == [""] * count + ["too_few"] * (4 - count)
-    assert results[-1].message.startswith(f"{count} of 4 required items")
 
 
 def test_it_names_what_the_tool_holds(fake: FakeCell, held: str) -> None:

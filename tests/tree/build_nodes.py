@@ -10,9 +10,11 @@ from typing import Any
 from hand_set_clock import Clock
 
 from executive.events import Emit, discard_event
+from executive.text.findings import NOWHERE
 from executive.tree.blackboard import Blackboard, NodeContext
 from executive.tree.decorators import Invert, Succeed, Timeout
-from executive.tree.loops import CounterLimits, ForEach, Repeat, While
+from executive.tree.expression import read_expression
+from executive.tree.loops import ForEach, Repeat, While
 from executive.tree.parallel import Parallel
 from executive.tree.retry import Backoff, Catch, Retry, TryCatch
 from executive.tree.sequences import Fallback
@@ -68,7 +70,8 @@ def retry(
 
 
 def repeat(site: NodeContext, body: Any, times: int | None = None, until: Names = (), **limits: float) -> Any:
-    ends = (*names_of(until), *((CounterLimits(**limits),) if limits else ()))
+    texts = [f"run.{name} >= {limit}" for name, limit in limits.items()]
+    ends = (*names_of(until), *(read_expression(text, NOWHERE, []) for text in texts))
     return build(site, Repeat, times=times, until=ends, do=body)
 
 

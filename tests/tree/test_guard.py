@@ -11,7 +11,7 @@ from executive.errors import Fault
 from executive.events import NodeEnded, NodeStarted
 from executive.testing.run_mission import make_substitute, run_mission
 from executive.tree.sequences import Guard
-from skills.conditions import HasElapsed
+from skills.conditions import IsReachable
 from tests.node_behaviours import build
 
 
@@ -77,10 +77,10 @@ routes: {cube: red_bin, sphere: blue_bin, duck: yellow_bin}
 tree:
   - [MoveToScan, Detect, Localize, SelectTarget]
   - guard:
-      holds: {all: [IsFresh, {not: {HasElapsed: {seconds: 60}}}, {any: [IsHolding, {not: IsHolding}]}]}
+      holds: {all: [IsFresh, run.elapsed < 60, {any: [IsHolding, {not: IsHolding}]}]}
       do: [Approach, Grasp]
   - try:
-      - guard: {holds: {not: {HasElapsed: {seconds: $limit}}}, do: Transit}
+      - guard: {holds: {all: [run.elapsed < $limit, {not: IsReachable}]}, do: Transit}
       - Release
     catch: [{on: guard.broken, do: [ConfirmGrasp, PutDown]}]
 params: {limit: 30.0}
@@ -95,13 +95,13 @@ def test_a_broken_guard_stops_the_arm(tmp_path: Any) -> None:
         nonlocal checks
         checks += 1
         if checks <= 100:
-            raise self.failure("too_early", "not yet")
+            raise self.failure("unreachable", "not yet")
 
-    late = make_substitute(HasElapsed, "Late", run)
-    result = run_mission(tmp_path / "m.yaml", substitutes={"*:try/*/HasElapsed": late})
+    late = make_substitute(IsReachable, "Late", run)
+    result = run_mission(tmp_path / "m.yaml", substitutes={"*:try/*/IsReachable": late})
     ends = [timed.event for timed in result.events if isinstance(timed.event, NodeEnded)]
     first = next(index for index, end in enumerate(ends) if end.reason == "guard.broken")
     assert (ends[first - 1].skill, ends[first - 1].status) == ("Transit", "INVALID")
-    assert ends[first].message == "not.inverted: HasElapsed succeeded"
+    assert ends[first].message == "not.inverted: IsReachable succeeded"
     assert (result.status, result.agrees, result.cell.arm.at_rest) == ("INCOMPLETE", True, True)
-    assert len(result.list_activated_nodes("*:try/*/HasElapsed")) == 2
+    assert len(result.list_activated_nodes("*:try/*/IsReachable")) == 2

@@ -164,7 +164,7 @@ def test_the_loop_ends_when_a_counter_reaches_its_limit_and_says_which(
     assert tick(node) == "R"
     counts[name] = 2
     assert tick(node) == "S"
-    assert choices(events) == [f"done, {name}: 2"]
+    assert choices(events) == [f"done, run.{name} >= 2"]
 
 
 def test_the_last_iteration_is_not_interrupted(
@@ -182,7 +182,7 @@ def test_the_counters_are_read_before_the_first_iteration(
 ) -> None:
     counts["placed"] = 5
     assert tick(repeat(counting_site, leaf("A"), placed=4)) == "S"
-    assert (log, choices(events)) == ([], ["done, placed: 4"])
+    assert (log, choices(events)) == ([], ["done, run.placed >= 4"])
 
 
 def test_a_reason_and_a_number_of_iterations_end_the_loop_as_before(

@@ -17,7 +17,8 @@ from executive.view.btcpp import format_btcpp
 COUNTERPARTS = {
     "Sequence": "", "Fallback": "", "ReactiveSequence": "", "ReactiveFallback": "", "Inverter": "",
     "ForceSuccess": "", "AlwaysSuccess": "", "Repeat": "num_cycles", "RetryUntilSuccessful": "num_attempts",
-    "Timeout": "msec", "Parallel": "success_count failure_count", "ParallelAll": "max_failures",
+    "Timeout": "msec", "ScriptCondition": "code", "IfThenElse": "",
+    "Parallel": "success_count failure_count", "ParallelAll": "max_failures",
 }  # fmt: skip
 """Ports of the nodes of BehaviorTree.CPP that represent control nodes."""
 
