@@ -99,6 +99,8 @@ def export_model(detector: Any, folder: Path) -> onnx.ModelProto:
 def compress_weights(model: onnx.ModelProto) -> onnx.ModelProto:
     """Return a copy of `model` with large matrices and filters as int8 and a scale per output channel.
 
+    Other large weights are float16.
+
     The compression moved 99 % of the centres of detected boxes by less than 0.03 pixel in a measurement.
     """
     compressed = onnx.ModelProto()
@@ -111,6 +113,10 @@ def compress_weights(model: onnx.ModelProto) -> onnx.ModelProto:
         values = numpy_helper.to_array(tensor)
         if tensor.name in output_axes and values.size >= MIN_COMPRESSED_COUNT:
             initializers += _to_int8(tensor.name, values, output_axes[tensor.name], added_nodes)
+        elif values.dtype == np.float32 and values.size >= MIN_COMPRESSED_COUNT:
+            half = f"{tensor.name}_half"
+            initializers.append(numpy_helper.from_array(values.astype(np.float16), half))
+            added_nodes.append(helper.make_node("Cast", [half], [tensor.name], to=TensorProto.FLOAT))
         else:
             initializers.append(tensor)
     # Protobuf does not allow the assignment of a list to a field.
@@ -289,12 +295,19 @@ def fit_model(
         lambda _module, _inputs, output: apply_to_collection(output, torch.Tensor, torch.Tensor.float)
     )
     data = SymmetryAugmentedData(detector.model_config, config)
-    trainer = build_trainer(config, detector.model_config, accelerator="gpu" if has_gpu else "cpu")
+    accelerator = "gpu" if has_gpu else "cpu"
+    precision = {"precision": "bf16-mixed"} if not has_gpu and _has_bfloat16_products() else {}
+    trainer = build_trainer(config, detector.model_config, accelerator=accelerator, **precision)
     trainer.callbacks.append(
         LambdaCallback(on_train_batch_end=report_batch_end, on_train_epoch_end=report_epoch_end)
     )
     trainer.fit(model, data)
     (out / "labels.txt").write_text("".join(f"{label}\n" for label in labels), encoding="utf-8")
+
+
+def _has_bfloat16_products() -> bool:
+    """Return True if the CPU multiplies bfloat16 matrices itself, about three times as fast as float32."""
+    return bool(torch.cpu.get_capabilities().get("avx512_bf16"))
 
 
 class SymmetryAugmentedData(RFDETRDataModule):
