@@ -9,7 +9,7 @@ import pytest
 
 from executive.cell.protocols import Cell
 from executive.skill import ANY, In, Metres, Out, Skill, param, port
-from executive.tree.tree_node import SkillRun
+from executive.tree.skill_leaf import SkillRun
 
 
 @pytest.mark.parametrize(

@@ -131,18 +131,17 @@ def _reads_param(value: Value) -> bool:
 def _check_result(name: str, declaration: Param | Port | Key, value: Value, result: StaticValue) -> None:
     """Raise a mistake if a declaration does not accept the value."""
     expected = _make_expected(declaration)
-    is_flag_for_number = result.type is bool and expected.type in (int, float)
-    if is_flag_for_number or not is_assignable(result.type, expected.type):
+    is_number_expected = expected.type in (int, float)
+    is_accepted = (
+        is_assignable(result.type, expected.type)
+        and not (is_number_expected and result.type is bool)
+        and (expected.refers_to in ("", result.refers_to) or result.type is Any)
+        and (expected.choices is None or set(result.choices or (None,)) <= {*expected.choices})
+    )
+    if not is_accepted:
         hint = "Use // or round for a whole number." if expected.type is int and result.is_number else ""
         message = f"{name} takes {expected.describe()}, but {value} is {result.describe()}"
         raise _Mistake(value.span, message, hint, "port-type")
-    if expected.refers_to not in ("", result.refers_to) and result.type is not Any:
-        message = f"{name} takes {expected.describe()}, but {value} is {result.describe()}"
-        raise _Mistake(value.span, message, code="port-type")
-    if expected.choices is not None and not set(result.choices or (None,)) <= {*expected.choices}:
-        known = replace(result, choices=None) if result.choices is None else result
-        message = f"{name} takes {expected.describe()}, but {value} is {known.describe()}"
-        raise _Mistake(value.span, message, code="port-type")
     if not result.is_number or result.type is Any:
         return
     if expected.unit is not ANY_UNIT and result.unit not in (expected.unit, ANY_UNIT):
@@ -240,8 +239,13 @@ class _Analysis:
                 message = f"{reference} has no such field"
                 hint = suggest_choice(reference.field, names, "Fields")
                 raise _Mistake(reference.span, message, hint, "unknown-field")
-            limits = (0.0,) if reference.field in ("count", "age", "attempts", "drops", "deferrals") else ()
-            writers = [StaticValue(each.type, each.refers_to, each.unit, *limits) for each in found]
+            # No field is a negative count or time.
+            writers = [
+                StaticValue(each.type, each.refers_to, each.unit, 0.0)
+                if each.type is int or each.unit == "s"
+                else StaticValue(each.type, each.refers_to, each.unit)
+                for each in found
+            ]
         if not writers:
             return StaticValue()
         first, *others = writers
@@ -393,7 +397,8 @@ def _compute_bounds(name: str, lows: list[float], highs: list[float]) -> tuple[f
     if name == "negative":
         return -highs[0], -lows[0]
     if name == "round":
-        return tuple(bound if math.isinf(bound) else float(round(bound)) for bound in (lows[0], highs[0]))  # type: ignore[return-value]
+        low, high = (bound if math.isinf(bound) else float(round(bound)) for bound in (lows[0], highs[0]))
+        return low, high
     corners = [_apply(name, one, other) for one in (lows[0], highs[0]) for other in (lows[1], highs[1])]
     return min(corners), max(corners)
 

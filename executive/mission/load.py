@@ -34,6 +34,7 @@ from executive.text.findings import Finding, MissionError, Source, make_warning,
 from executive.text.yaml_files import parse_yaml
 from executive.tree.blackboard import Blackboard, NodeContext, Wiring
 from executive.tree.node import ControlNode, load_control_nodes
+from executive.tree.skill_leaf import SkillLeaf
 from executive.tree.specification import (
     Constant,
     Expression,
@@ -43,7 +44,7 @@ from executive.tree.specification import (
     SkillNode,
     SubtreeNode,
 )
-from executive.tree.tree_node import SkillLeaf, TreeNode
+from executive.tree.tree_node import TreeNode
 
 Check = Callable[[CheckContext], Iterator[Finding]]
 """Function that yields the findings of one check."""

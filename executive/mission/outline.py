@@ -12,7 +12,7 @@ from py_trees.behaviour import Behaviour
 from pydantic import Field
 
 from executive.tree.node import ControlNode
-from executive.tree.tree_node import SkillLeaf
+from executive.tree.skill_leaf import SkillLeaf
 
 _INDEX_PATTERN = re.compile(r"[0-9]+:")
 """Index before the name of a list element in a path: `2:` in `2:try`."""

@@ -32,7 +32,8 @@ from executive.run.assembly import RunOptions, build_station, complete
 from executive.run.run import Run, brake_arm
 from executive.station.border import RecordedInput
 from executive.station.station import Station
-from executive.tree.tree_node import SkillLeaf, halt
+from executive.tree.skill_leaf import SkillLeaf
+from executive.tree.tree_node import halt
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ from executive.skill import Skill
 from executive.station.station import Station
 from executive.testing.fake_cell import FakeCell
 from executive.testing.faulty_cell import FaultInjector, ScheduledFault
-from executive.tree.tree_node import SkillLeaf
+from executive.tree.skill_leaf import SkillLeaf
 
 MISSION_TIMEOUT = 600.0
 """Default timeout of a run, on the run's clock [s]; after the timeout the run ends as a fault."""

@@ -16,7 +16,7 @@ from executive.run.run import MAX_BRAKING_TIME
 from executive.skill import Skill, SkillFailed
 from executive.station.border import Access, Border
 from executive.station.station import Station
-from executive.tree.tree_node import SkillRun
+from executive.tree.skill_leaf import SkillRun
 
 _ROLES = ("arm", "tool", "camera", "ledger", "localizer", "operator")
 """Parts of a cell whose accesses tests observe, beside the detectors."""

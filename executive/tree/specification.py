@@ -9,7 +9,7 @@ import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Annotated, TypeVar
+from typing import Annotated, ClassVar, TypeVar
 
 from pydantic import BaseModel, ConfigDict, JsonValue, SkipValidation, WithJsonSchema
 from pydantic_core import core_schema
@@ -104,8 +104,28 @@ class InvalidValue:
     span: Span
 
 
+class SchemaDefinition:
+    """Mixin of types that the schema of missions defines under a name, and that pydantic does not validate.
+
+    Attributes:
+        definition: Name of the definition in the schema of missions.
+    """
+
+    definition: ClassVar[str]
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, *_: object) -> core_schema.CoreSchema:
+        """Return a schema that accepts every value."""
+        return core_schema.any_schema()
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, *_: object) -> dict[str, JsonValue]:
+        """Return the reference to the definition in the schema of missions."""
+        return {"definition": cls.definition}
+
+
 @dataclass(frozen=True)
-class Expression:
+class Expression(SchemaDefinition):
     """A formula that a run evaluates when its node starts, for instance `= $n + 1`.
 
     Attributes:
@@ -113,6 +133,8 @@ class Expression:
         operands: Operands of the operation.
         span: Position of the operation in the file.
     """
+
+    definition = "expression"
 
     operator: str
     operands: tuple[Value, ...]
@@ -155,16 +177,6 @@ class Expression:
                 return f"{self.operator}({', '.join(names)})"
         return f" {self.operator} ".join(names)
 
-    @classmethod
-    def __get_pydantic_core_schema__(cls, *_: object) -> core_schema.CoreSchema:
-        """Return a schema that accepts every value."""
-        return core_schema.any_schema()
-
-    @classmethod
-    def __get_pydantic_json_schema__(cls, *_: object) -> dict[str, JsonValue]:
-        """Return the reference to the definition in the schema of missions."""
-        return {"definition": "expression"}
-
 
 Value = Constant | Reference | Expression | InvalidValue
 
@@ -189,13 +201,15 @@ class LocatedName(str):
         return located_name
 
 
-class VariableName(str):
+class VariableName(SchemaDefinition, str):
     """Name of a variable of the mission.
 
     Attributes:
         field: Name of a field of the value; "" for the whole value.
         span: Position of the name.
     """
+
+    definition = "variable"
 
     field: str
     span: Span
@@ -206,16 +220,6 @@ class VariableName(str):
         variable.field = field
         variable.span = span
         return variable
-
-    @classmethod
-    def __get_pydantic_core_schema__(cls, *_: object) -> core_schema.CoreSchema:
-        """Return a schema that accepts every value."""
-        return core_schema.any_schema()
-
-    @classmethod
-    def __get_pydantic_json_schema__(cls, *_: object) -> dict[str, JsonValue]:
-        """Return the reference to the definition in the schema of missions."""
-        return {"definition": "variable"}
 
 
 SpecificationT = TypeVar("SpecificationT", bound="Specification")

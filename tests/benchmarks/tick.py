@@ -32,7 +32,7 @@ from executive.tree.blackboard import Blackboard, NodeContext, Wiring
 from executive.tree.decorators import Timeout
 from executive.tree.retry import Retry
 from executive.tree.sequences import Sequence as SequenceNode
-from executive.tree.tree_node import SkillLeaf
+from executive.tree.skill_leaf import SkillLeaf
 from tests.benchmarks.report import Figures, run_command
 from tests.node_behaviours import build
 

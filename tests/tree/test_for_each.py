@@ -15,7 +15,8 @@ from executive.events import BranchChosen
 from executive.skill import In, Skill, port
 from executive.tree.blackboard import Blackboard, Wiring
 from executive.tree.loops import ForEach
-from executive.tree.tree_node import SkillLeaf, halt
+from executive.tree.skill_leaf import SkillLeaf
+from executive.tree.tree_node import halt
 
 
 class Use(Skill):

@@ -14,7 +14,8 @@ from executive.errors import Fault
 from executive.events import NodeEnded, NodeStarted
 from executive.skill import In, Out, Skill, param, port
 from executive.tree.blackboard import Blackboard, Wiring
-from executive.tree.tree_node import SkillLeaf, halt
+from executive.tree.skill_leaf import SkillLeaf
+from executive.tree.tree_node import halt
 
 
 class Worker(Skill):

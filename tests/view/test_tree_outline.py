@@ -12,8 +12,8 @@ from executive.skill import In, Metres, Out, Skill, param, port
 from executive.tree.blackboard import Blackboard, NodeContext, Wiring
 from executive.tree.retry import Catch, Retry, TryCatch
 from executive.tree.sequences import Sequence
+from executive.tree.skill_leaf import SkillLeaf
 from executive.tree.specification import Reason
-from executive.tree.tree_node import SkillLeaf
 from executive.view.drawing import draw_text, fold_subtrees
 from tests.node_behaviours import build, specify
 
