@@ -51,7 +51,7 @@ class StaticValue:
     def describe(self) -> str:
         """Return a description for a sentence: `a number in m`."""
         if self.refers_to:
-            return f"the name of a {self.refers_to}"
+            return f"the name of {'an' if self.refers_to[0] in 'aeiou' else 'a'} {self.refers_to}"
         if self.choices is not None:
             return " or ".join(map(str, self.choices))
         return describe_type(self.type) + (f" in {self.unit}" if self.unit and self.is_number else "")
@@ -332,7 +332,10 @@ class _Analysis:
         return StaticValue(bool, low=0.0, high=1.0)
 
     def _check_name(self, value: StaticValue, constant: Constant | None) -> None:
-        """Raise a mistake if a constant that is compared with a name is no name of its kind."""
+        """Raise a mistake if a constant is not what the value that it is compared with may be."""
+        if constant is not None and value.choices is not None and constant.value not in value.choices:
+            message = f"the value is {value.describe()} and never equals {describe_value(constant.value)}"
+            raise _Mistake(constant.span, message)
         names = self._context.names_in_cell_by_kind.get(value.refers_to)
         if names is None or constant is None or constant.value in ("", *names):
             return
@@ -353,11 +356,8 @@ class _Analysis:
         types = {operand.type for operand in operands}
         type_: object = Any if Any in types else int if types == {int} and name != "/" else float
         unit = self._compute_unit(expression, operands)
-        if (
-            name in ("/", "//", "%")
-            and operands[1].low <= 0 <= operands[1].high
-            and operands[1].type is not Any
-        ):
+        divides = name in ("/", "//", "%") and operands[1] != StaticValue()
+        if divides and operands[1].low <= 0 <= operands[1].high:
             hint = "Use max(1, …), or check the divisor with `if` and declare its min."
             raise _Mistake(
                 expression.operands[1].span, f"{expression.operands[1]} may be 0, and divides here", hint
@@ -365,7 +365,11 @@ class _Analysis:
         if name == "round":
             type_ = int
         lows, highs = [one.low for one in operands], [one.high for one in operands]
-        return StaticValue(type_, "", unit, *_compute_bounds(name, lows, highs))
+        low, high = _compute_bounds(name, lows, highs)
+        if name == "%" and type_ is int:
+            # The remainder of whole numbers is nearer to 0 than the divisor.
+            low, high = min(low + 1, 0.0), max(high - 1, 0.0)
+        return StaticValue(type_, "", unit, low, high)
 
     def _compute_unit(self, expression: Expression, operands: list[StaticValue]) -> str | None:
         name = expression.operator
@@ -386,7 +390,7 @@ def _compute_bounds(name: str, lows: list[float], highs: list[float]) -> tuple[f
     """Return the smallest and the largest result of an operation on numbers."""
     if name == "%":
         # The result has the sign of the divisor.
-        return (0.0, highs[1]) if lows[1] > 0 else (lows[1], 0.0)
+        return min(lows[1], 0.0), max(highs[1], 0.0)
     if name == "abs":
         return (
             0.0 if lows[0] <= 0 <= highs[0] else min(abs(lows[0]), abs(highs[0])),
@@ -399,6 +403,8 @@ def _compute_bounds(name: str, lows: list[float], highs: list[float]) -> tuple[f
     if name == "round":
         low, high = (bound if math.isinf(bound) else float(round(bound)) for bound in (lows[0], highs[0]))
         return low, high
+    if name in ("/", "//") and lows[1] <= 0 <= highs[1]:
+        return -math.inf, math.inf
     corners = [_apply(name, one, other) for one in (lows[0], highs[0]) for other in (lows[1], highs[1])]
     return min(corners), max(corners)
 

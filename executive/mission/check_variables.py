@@ -274,7 +274,9 @@ def _check_assignment(
             yield make_error(wire.span, "shadowed-variable", message, "Rename the variable.")
         return
     if not declared:
-        names = [name for name, all_writers in writers.items() if all_writers[0].declaration]
+        names = [
+            known.rpartition(".")[2] for known, all_writers in writers.items() if all_writers[0].declaration
+        ]
         hint = suggest_choice(name, names, "Variables") if names else "Declare it in variables: {NAME: 0}."
         yield make_error(wire.span, "unknown-variable", f"the mission declares no variable {name}", hint)
         return
@@ -386,7 +388,11 @@ def _check_connection(
     if writer.constants is not None:
         return
     is_type_accepted = is_assignable(writer.type, port.type)
-    declared_choices = writer.declaration.choices if writer.declaration else None
+    declared_choices = (writer.declaration.choices if writer.declaration else None) or ()
+    if is_type_accepted and declared_choices and port.refers_to:
+        for choice in declared_choices:
+            yield from find_unknown_names(context, wire.node.type_name, port, Constant(choice, wire.span))
+        return
     if is_type_accepted and declared_choices and {*declared_choices} <= {*choices}:
         return
     if is_type_accepted and (writer.refers_to == port.refers_to if port.refers_to else not choices):

@@ -223,6 +223,11 @@ class _Expander:
             cycle = " -> ".join((*callers[callers.index(use.name) :], use.name))
             self._add_error(use.span, "recursive-use", f"a subtree cannot use itself: {cycle}")
             return use
+        for name in subtree.returns or ():
+            if name in subtree.variables:
+                message = f"{name} is a variable of the subtree, so that the subtree cannot return it"
+                hint = f"Declare {name} where the subtree is used; `set` in the subtree then changes it."
+                self._add_error(name.span, "shadowed-variable", message, hint)
         arguments = self._collect_arguments(use, subtree)
         returns = self._map_returned_variables(use, subtree)
         self._use_counts[use.name] += 1
@@ -234,10 +239,12 @@ class _Expander:
         body = self._expand_node(body, {**params, **arguments}, (*callers, use.name), depth + 1)
         local_names = set(map(str, subtree.variables))
         if subtree.returns is not None:
-            assigned = {wire.variable for wire in list_assignments(body, self.skills)}
-            local_names |= find_written_variables(body, self.skills) - (
-                assigned & self.mission.variables.keys()
+            # A variable that the mission or a caller declares is not local.
+            declared = {*self.mission.variables}.union(
+                *(self.mission.subtrees[one].variables for one in callers)
             )
+            shared = {wire.variable for wire in list_assignments(body, self.skills)} & declared
+            local_names |= find_written_variables(body, self.skills) - shared
         body = self._rename_variables(use, body, returns, local_names)
         return use.replace(body=body, written_variables=tuple(returns.values()))
 

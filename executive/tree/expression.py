@@ -72,15 +72,20 @@ def read_expression(text: str, span: Span, findings: list[Finding]) -> Value:
     After an error, which is added to `findings`, the result is an invalid value.
     """
     start = len(text) - len(text.removeprefix(MARK).lstrip())
-    return _parse(text[start:], _locate(text, span, start, len(text) - start), findings)
+    return _parse(text, start, len(text), span, findings)
 
 
-def _parse(text: str, place: Span, findings: list[Finding]) -> Value:
-    """Return the expression in a text that begins at a position, or an invalid value after an error."""
+def _parse(text: str, start: int, end: int, span: Span, findings: list[Finding]) -> Value:
+    """Return the expression in a part of a scalar at `span`, or an invalid value after an error."""
+
+    def locate(column: int, length: int) -> Span:
+        return _locate(text, span, start + column, length)
+
+    parser = _Parser(text[start:end].replace("\n", " "), locate)
     try:
-        return _Parser(text, place).parse()
+        return parser.parse()
     except ExpressionError as error:
-        place = replace(place, col=place.col + error.column, length=max(1, place.length - error.column))
+        place = parser.locate(error.column, end - start - error.column)
         findings.append(make_error(place, "expression", str(error), error.hint))
         return InvalidValue(place)
 
@@ -98,7 +103,7 @@ def read_template(text: str, span: Span, findings: list[Finding]) -> Value:
         if hole[1] is None:
             parts.append(Constant(hole[0][0], span))
         else:
-            parts.append(_parse(hole[1], _locate(text, span, hole.start(1), len(hole[1])), findings))
+            parts.append(_parse(text, *hole.span(1), span, findings))
     parts.append(Constant(text[end:], span))
     if any(_VARIABLE.search(str(one.value)) for one in parts if isinstance(one, Constant)):
         hint = "Write a variable in braces: {$name}."
@@ -122,11 +127,11 @@ def _locate(text: str, span: Span, column: int, length: int) -> Span:
 
 
 class _Parser:
-    """Parser of one expression at a position."""
+    """Parser of one expression; `locate` returns the position of a part of it from column and length."""
 
-    def __init__(self, text: str, span: Span) -> None:
+    def __init__(self, text: str, locate: Callable[[int, int], Span]) -> None:
         self._text = text
-        self._span = span
+        self.locate = locate
         # `$` becomes `_`, so that all columns stay; names that begin with `_` are not allowed.
         self._python_text = _VARIABLE.sub("_", text)
 
@@ -260,7 +265,11 @@ class _Parser:
                 return Constant(word == "true", span)
         if is_variable:
             raise ExpressionError(f'"{text}" has too many parts: a variable has one field', column)
-        hint = f'For the variable, write ${text}; for a text, "{text}".' if not parts else _RULE
+        hint = f"For the variable, write ${text}."
+        if not parts:
+            hint = f'For the variable, write ${text}; for a text, "{text}".'
+        elif root.id in ("run", "bin"):
+            hint = _RULE
         if "bin." in self._text and "-" in self._text:
             hint = 'Write a name with a hyphen in brackets and quotes: bin["red-bin"].count.'
         raise ExpressionError(f'there is no value "{text}"', column, hint)
@@ -277,9 +286,7 @@ class _Parser:
         ]
 
     def _make_span(self, node: ast.AST) -> Span:
-        return replace(
-            self._span, col=self._span.col + self._get_column(node), length=max(1, len(self._cut(node)))
-        )
+        return self.locate(self._get_column(node), len(self._cut(node)))
 
 
 @dataclass(frozen=True)
@@ -365,7 +372,7 @@ class Scope:
             case "value":
                 return operands[0]
             case "text":
-                return "".join(f"{one:.4g}" if isinstance(one, float) else str(one) for one in operands)
+                return "".join(f"{one:.6g}" if isinstance(one, float) else str(one) for one in operands)
             case "not":
                 return not operands[0]
             case "in" | "not in":

@@ -8,7 +8,7 @@ from math import inf, isfinite
 from typing import cast
 
 from executive.skill import Seconds
-from executive.text.findings import Finding, make_warning
+from executive.text.findings import Finding, make_error, make_warning
 from executive.tree.flow import Flow, FlowFunction, FlowState, find_fixed_point, join_states
 from executive.tree.keys import KeySection, Reasons, key
 from executive.tree.loops import GeneratorBehaviour, NodeRun
@@ -250,7 +250,14 @@ class TryCatch(ControlNode):
         return flow if self.finally_ is None else _append_finally(self.finally_, flow, get_flow)
 
     def check(self, analysis: NodeAnalysis) -> Iterator[Finding]:
-        """Yield a warning for each reason whose failures are all caught by earlier reasons."""
+        """Yield a warning for each reason whose failures are all caught by earlier reasons.
+
+        A node in `finally` that ends the mission with success is an error, because it hides failures.
+        """
+        for node in self.finally_.walk() if self.finally_ else ():
+            if isinstance(node, ControlNode) and node.ends_mission:
+                message = f"{node.path_name} in `finally` ends the mission with success also after a failure"
+                yield make_error(node.span, "finish-in-finally", message, "Put it at the end of the body.")
         body = analysis.get_flow(self.do)
         failures = () if body is None else body.failures
         earlier_reasons: list[Reason] = []
