@@ -55,7 +55,7 @@ def load_cells(
         InputError: A cell does not exist, two cells have the same name, or a file is invalid.
     """
     cells: dict[Path, CellConfig] = {}
-    for path in map(find_cell, paths_or_names):
+    for path in dict.fromkeys(map(find_cell, paths_or_names)):
         config = load_cell(path, overrides)
         if any(config.cell == other.cell for other in cells.values()):
             raise InputError(f'two cells are called "{config.cell}"; give one of them another name')

@@ -10,6 +10,7 @@ import click
 
 from executive.cli import shared
 from executive.errors import InputError
+from executive.text.files import find_cell
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
 """File name suffixes of the formats in which the worst mistakes can be saved."""
@@ -31,14 +32,16 @@ def dataset_command(
 ) -> None:
     """Render labelled images for the training of a detector.
 
-    The images show random scenes of each CELL (a cell file or the name of a shipped cell) in turn.
+    The images show random scenes of each CELL (a cell file or the name of a shipped cell) in turn. A cell
+    that is named several times has several turns.
     """
     with shared.keep_stdout_clean():
         # The imports take a second, for which `--help` and wrong options must not wait.
         from executive.campaign.evaluation import load_cells
         from executive.training.rendering import generate_dataset
 
-        configs = list(load_cells(cells).values())
+        configs_by_path = load_cells(cells)
+        configs = [configs_by_path[find_cell(cell)] for cell in cells]
         with shared.show_progress("rendering") as progress:
             generate_dataset(
                 configs, out, image_count=images, seed=seed, layout=dataset_format, worker_count=workers,

@@ -59,7 +59,7 @@ MAX_HEAVILY_OCCLUDED_FRACTION = 1 / 6
 """Maximum fraction of heavily occluded objects in a scene; one such object is always allowed."""
 MAX_ATTEMPTS = 50
 """Maximum number of random scenes that are sampled for an image before an error is raised."""
-NOMINAL_SCENE_FRACTION = 0.2
+NOMINAL_SCENE_FRACTION = 0.35
 """Fraction of the random scenes with table, light, camera and noise as in the cell file."""
 MIN_CONTRAST = 5
 """Minimum contrast between a labelled object and its surroundings, in standard deviations of the noise."""
